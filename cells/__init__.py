@@ -1,0 +1,1 @@
+"""Cell descriptions shipped with reachmap, as data files."""

@@ -1,0 +1,106 @@
+"""Rigid transforms as NumPy arrays: rotations, quaternions, angles.
+
+Poses are 4×4 homogeneous matrices named ``T_<to>_<from>``: ``T_a_b`` maps points
+given in frame b into frame a. Quaternions are ``wxyz``, unit, with ``w >= 0``.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from reachmap._typing import FloatArray
+
+AXES: dict[str, tuple[int, float]] = {
+    f"{sign}{name}": (index, 1.0 if sign == "+" else -1.0)
+    for index, name in enumerate("xyz")
+    for sign in "+-"
+}
+
+
+def transform_from_parts(R: FloatArray, p: FloatArray) -> FloatArray:
+    """Assemble homogeneous matrices.
+
+    Parameters
+    ----------
+    R : array, shape (..., 3, 3)
+    p : array, shape (..., 3)
+        Translation [m].
+
+    Returns
+    -------
+    array, shape (..., 4, 4)
+    """
+    R, p = np.asarray(R, float), np.asarray(p, float)
+    shape = np.broadcast_shapes(R.shape[:-2], p.shape[:-1])
+    T = np.zeros((*shape, 4, 4))
+    T[..., :3, :3] = R
+    T[..., :3, 3] = p
+    T[..., 3, 3] = 1.0
+    return T
+
+
+def inverse_transform(T: FloatArray) -> FloatArray:
+    """Invert rigid transforms, shape (..., 4, 4)."""
+    R_t = np.swapaxes(T[..., :3, :3], -1, -2)
+    return transform_from_parts(R_t, -(R_t @ T[..., :3, 3:4])[..., 0])
+
+
+def rotation_from_rpy_deg(rpy_deg: FloatArray) -> FloatArray:
+    """Roll, pitch, yaw [deg] about fixed x, y, z (the URDF order), (..., 3, 3)."""
+    angles = np.atleast_2d(np.asarray(rpy_deg, float))
+    R = Rotation.from_euler("xyz", angles, degrees=True).as_matrix()
+    return np.asarray(R.reshape(*np.shape(rpy_deg)[:-1], 3, 3))
+
+
+def rotation_from_quaternion_wxyz(quaternion: FloatArray) -> FloatArray:
+    """Rotation matrices of quaternions ``wxyz``, (..., 4) to (..., 3, 3)."""
+    q = np.asarray(quaternion, float)
+    flat = np.roll(q.reshape(-1, 4), -1, axis=1)
+    return np.asarray(Rotation.from_quat(flat).as_matrix().reshape(*q.shape[:-1], 3, 3))
+
+
+def quaternion_wxyz_from_rotation(R: FloatArray) -> FloatArray:
+    """Unit quaternions ``wxyz`` with ``w >= 0``, (..., 3, 3) to (..., 4)."""
+    R = np.asarray(R, float)
+    flat = Rotation.from_matrix(R.reshape(-1, 3, 3)).as_quat(canonical=True)
+    return np.asarray(np.roll(flat, 1, axis=1).reshape(*R.shape[:-2], 4))
+
+
+def rotation_angle(R_a: FloatArray, R_b: FloatArray) -> FloatArray:
+    """Angle of the rotation between two orientations [rad], in [0, π].
+
+    This is φ2 = ‖log(R_a R_bᵀ)‖, Eq. (3) of the paper. The half-angle form by
+    ``atan2`` keeps full precision near 0 and near π, where ``acos`` loses half
+    the digits.
+
+    Parameters
+    ----------
+    R_a, R_b : array, shape (..., 3, 3)
+
+    Returns
+    -------
+    array, shape (...)
+    """
+    difference = R_a - R_b
+    total = R_a + R_b
+    # ‖A − B‖_F = 2√2 sin(θ/2); ‖A + B‖²_F = 4 + 8 cos²(θ/2).
+    sine = np.linalg.norm(difference, axis=(-2, -1)) / np.sqrt(8.0)
+    cosine_sq = (np.linalg.norm(total, axis=(-2, -1)) ** 2 - 4.0) / 8.0
+    return np.asarray(2.0 * np.arctan2(sine, np.sqrt(np.maximum(cosine_sq, 0.0))))
+
+
+def direction_angle(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Angle between unit vectors [rad], (..., 3) and (..., 3) to (...)."""
+    chord = np.linalg.norm(a - b, axis=-1)
+    total = np.linalg.norm(a + b, axis=-1)
+    return np.asarray(2.0 * np.arctan2(chord, total))
+
+
+def yaw_transform(
+    x: float, y: float, z: float, yaw_rad: float
+) -> FloatArray:
+    """Pose with a translation [m] and a rotation about z [rad], (4, 4)."""
+    c, s = np.cos(yaw_rad), np.sin(yaw_rad)
+    R = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    return transform_from_parts(R, np.array([x, y, z]))

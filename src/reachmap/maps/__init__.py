@@ -1,0 +1,1 @@
+"""The artefacts: records, their HDF5 form, provenance, checksums."""

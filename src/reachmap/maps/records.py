@@ -1,0 +1,326 @@
+"""What the artefacts hold, as frozen records of read-only arrays."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import IntEnum
+from typing import Any
+
+import numpy as np
+
+from reachmap._typing import BoolArray, CodeArray, FloatArray, IntArray
+
+NO_PAIR = -1
+
+
+class Status(IntEnum):
+    """What became of a test frame; the stored codes never change meaning."""
+
+    NOT_ATTEMPTED = 0
+    PATH_FOUND = 1
+    NO_IK = 2
+    IK_IN_COLLISION = 3
+    NO_PATH_FOUND = 4
+    ERROR = 5
+    APPROACH_BLOCKED = 6
+
+
+def freeze(record: Any) -> None:
+    """Make every array of a dataclass read-only (for ``__post_init__``)."""
+    for item in dataclasses.fields(record):
+        value = getattr(record, item.name)
+        if isinstance(value, np.ndarray):
+            value.setflags(write=False)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Provenance:
+    """What an artefact was made from, complete enough to make it again.
+
+    Attributes
+    ----------
+    cell_yaml : str
+        The cell file as read.
+    cell_resolved_json : str
+        The cell after defaults and overrides, paths made absolute where found.
+    overrides : tuple of str
+        ``--set`` assignments, in order.
+    urdf, srdf : str
+        Text of the robot description after xacro; srdf may be empty.
+    files_sha256 : mapping
+        Mesh name (as the cell or URDF names it) to the sha256 of its bytes.
+    packages : mapping
+        Distribution name to version.
+    settings : mapping
+        Method, planner, checking and simplification settings as JSON values.
+    source_sha256 : str
+        ``content_sha256`` of the artefact this one was made from, or "".
+    """
+
+    cell_yaml: str
+    cell_resolved_json: str
+    overrides: tuple[str, ...] = ()
+    urdf: str = ""
+    srdf: str = ""
+    files_sha256: Mapping[str, str] = field(default_factory=dict)
+    packages: Mapping[str, str] = field(default_factory=dict)
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    source_sha256: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RunInfo:
+    """How one run went; outside every hash.
+
+    ``wall_s`` and ``cpu_s`` map the name of a phase to seconds.
+    """
+
+    started: str = ""
+    finished: str = ""
+    host: str = ""
+    command_line: str = ""
+    workers: int = 1
+    wall_s: Mapping[str, float] = field(default_factory=dict)
+    cpu_s: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Stamp:
+    """The root attributes every artefact carries besides its format."""
+
+    seed: int
+    cell_sha256: str
+    config_sha256: str
+    content_sha256: str = ""
+    format_version: str = "1.0"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CubeMap:
+    """One cube of a workspace scan. Index order (z, y, x, orientation).
+
+    Attributes
+    ----------
+    x, y, z : array, shape (nx,), (ny,), (nz,)
+        Lattice coordinates in robot_base [m].
+    quaternion_wxyz : array, shape (no, 4)
+        TCP orientation of each test frame in robot_base.
+    status : uint8 array, shape (nz, ny, nx, no)
+        :class:`Status` codes.
+    blocking_pair : int16 array, same shape
+        Index into ``body_pairs``, -1 where there is none.
+    n_ik, n_ik_free, attempts, paths_found : uint8 array, same shape
+    component : int32 array, same shape
+        Connected component of the roadmap, -1 where there is none.
+    path_length : array, same shape
+        Joint-space length of the path [rad], NaN unless ``path_found``.
+    goal_configuration : array, shape (nz, ny, nx, no, dof)
+        The free goal that the result rests on [rad], NaN where there is none.
+    """
+
+    x: FloatArray
+    y: FloatArray
+    z: FloatArray
+    quaternion_wxyz: FloatArray
+    status: CodeArray
+    blocking_pair: IntArray
+    n_ik: CodeArray
+    n_ik_free: CodeArray
+    attempts: CodeArray
+    paths_found: CodeArray
+    component: IntArray
+    path_length: FloatArray
+    goal_configuration: FloatArray
+
+    def __post_init__(self) -> None:
+        freeze(self)
+
+    def percent(self, kind: str) -> FloatArray:
+        """Eq. (1): share of frames per point [percent], shape (nz, ny, nx).
+
+        Parameters
+        ----------
+        kind : {"path", "ik", "ik_free"}
+        """
+        hit: BoolArray = {
+            "path": self.status == Status.PATH_FOUND,
+            "ik": self.n_ik > 0,
+            "ik_free": self.n_ik_free > 0,
+        }[kind]
+        attempted = self.status != Status.NOT_ATTEMPTED
+        count = attempted.sum(axis=-1)
+        with np.errstate(invalid="ignore"):
+            return np.asarray(100.0 * (hit & attempted).sum(axis=-1) / count)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WorkspaceMap:
+    """Path reachability over the cubes, seen from one scan configuration.
+
+    ``x``, ``y``, ``z`` and the three percentages are the stitched lattice, where
+    frames of points that cubes share are pooled (Eq. 1).
+    """
+
+    cubes: Mapping[str, CubeMap]
+    x: FloatArray
+    y: FloatArray
+    z: FloatArray
+    path_reachability: FloatArray
+    ik_reachability: FloatArray
+    ik_free_reachability: FloatArray
+    scan_configuration: FloatArray
+    joint_names: tuple[str, ...]
+    body_pairs: tuple[str, ...]
+    method: str
+    stamp: Stamp
+    provenance: Provenance
+    run: RunInfo = RunInfo()
+
+    def __post_init__(self) -> None:
+        freeze(self)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PathStore:
+    """Ragged store of joint paths (CF contiguous ragged array).
+
+    Attributes
+    ----------
+    configuration : array, shape (points, dof)
+        Way-points of all paths, one after another [rad].
+    row_size : int array, shape (paths,)
+        Number of way-points of each path.
+    planned_size : int array, shape (paths,)
+        How many of them, from the first, are the planned part; the rest is the
+        straight approach.
+    index : int array, shape (paths, 5)
+        layer, y, x, orientation, repeat of each path.
+    """
+
+    configuration: FloatArray
+    row_size: IntArray
+    planned_size: IntArray
+    index: IntArray
+
+    def __post_init__(self) -> None:
+        freeze(self)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BinMap:
+    """Every attempt at every test grasp of a bin.
+
+    Index order (layer, y, x, orientation, repeat). ``x``, ``y``, ``layer`` [m] are
+    in the bin frame: origin at the centre of the inner bottom, x along the long
+    side, z up.
+
+    Attributes
+    ----------
+    bin_pose : array, shape (4, 4)
+        T_base_bin.
+    position : array, shape (nl, ny, nx, 3)
+        d_test in robot_base [m].
+    quaternion_wxyz : array, shape (nl, ny, nx, no, 4)
+        R_test in robot_base.
+    approach_axis : str
+        TCP axis that points into the object.
+    status, blocking_pair, n_ik, n_ik_free : array, shape (nl, ny, nx, no)
+    connected : uint8 array, shape (nl, ny, nx, no)
+        1 where the roadmap proves a path, whether or not an attempt found one.
+    path_found : uint8 array, shape (nl, ny, nx, no, nr)
+    path_length, path_length_total : array, same shape
+        Planned part, and planned part plus straight approach [rad].
+    tcp_path_length : array, same shape
+        Length of the TCP's way, whole path [m].
+    planning_time, planning_cpu_time, simplification_time, execution_time
+        Array, same shape [s]; NaN where no path.
+    goal_configuration : array, shape (nl, ny, nx, no, dof)
+        Of the shortest path [rad].
+    path_reachability : array, shape (nl, ny, nx)
+        Percent over orientations.
+    """
+
+    layer: FloatArray
+    y: FloatArray
+    x: FloatArray
+    bin_pose: FloatArray
+    bin_inner: FloatArray
+    position: FloatArray
+    quaternion_wxyz: FloatArray
+    approach_axis: str
+    approach_distance: float
+    status: CodeArray
+    blocking_pair: IntArray
+    n_ik: CodeArray
+    n_ik_free: CodeArray
+    connected: CodeArray
+    path_found: CodeArray
+    path_length: FloatArray
+    path_length_total: FloatArray
+    tcp_path_length: FloatArray
+    planning_time: FloatArray
+    planning_cpu_time: FloatArray
+    simplification_time: FloatArray
+    execution_time: FloatArray
+    goal_configuration: FloatArray
+    path_reachability: FloatArray
+    scan_configuration: FloatArray
+    joint_names: tuple[str, ...]
+    body_pairs: tuple[str, ...]
+    paths: PathStore
+    stamp: Stamp
+    provenance: Provenance
+    run: RunInfo = RunInfo()
+
+    def __post_init__(self) -> None:
+        freeze(self)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BinPlacement:
+    """Where the bin goes, the configuration it is imaged from, and the runners-up.
+
+    Candidates are rows: the chosen one is row ``chosen``.
+
+    Attributes
+    ----------
+    bin_pose : array, shape (4, 4)
+        T_base_bin of the chosen candidate.
+    scan_configuration : array, shape (dof,)
+    candidate_pose : array, shape (n, 4)
+        x, y, z [m], yaw [rad] of each candidate in robot_base.
+    score : array, shape (n,)
+        Mean path reachability over the pick volume [percent], NaN if excluded.
+    worst_point, reachable_share : array, shape (n,)
+        Percent.
+    exact : uint8 array, shape (n,)
+        1 where the bin was in the scene, 0 where the map was interpolated.
+    reason : tuple of str
+        Why a candidate is excluded, "" if it is not.
+    margin : mapping
+        Direction ("+x", "-yaw", …) to how far the bin can move [m or rad] before
+        the score drops by 5 points.
+    """
+
+    bin_pose: FloatArray
+    scan_configuration: FloatArray
+    chosen: int
+    runner_up: int
+    paper_choice: int
+    rule: str
+    candidate_pose: FloatArray
+    score: FloatArray
+    worst_point: FloatArray
+    reachable_share: FloatArray
+    exact: CodeArray
+    reason: tuple[str, ...]
+    margin: Mapping[str, float]
+    joint_names: tuple[str, ...]
+    stamp: Stamp
+    provenance: Provenance
+    run: RunInfo = RunInfo()
+
+    def __post_init__(self) -> None:
+        freeze(self)
