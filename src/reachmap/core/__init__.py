@@ -1,0 +1,1 @@
+"""The shared core: robot model, kinematics, collision checks, motions, planning."""
