@@ -1,0 +1,45 @@
+"""The ``reachmap`` command; one file per subcommand, each a thin client of a tool."""
+
+from __future__ import annotations
+
+from typing import NoReturn
+
+import click
+
+from reachmap import __version__
+from reachmap.cli.group import PipelineGroup
+
+__all__ = ["group", "main"]
+
+
+@click.group(
+    cls=PipelineGroup,
+    name="reachmap",
+    context_settings={
+        "auto_envvar_prefix": "REACHMAP",
+        "help_option_names": ["-h", "--help"],
+        "max_content_width": 88,
+    },
+)
+@click.version_option(__version__, prog_name="reachmap", message="%(prog)s %(version)s")
+def group() -> None:
+    """Path-reachability maps for bin-picking cells.
+
+    A robot cell goes in, maps come out, and every later question is answered from a
+    map: where the bin goes, which grasps the arm really reaches, and which to pick
+    first. Each command of the pipeline writes one file that the next one reads.
+
+    \b
+    Example:
+      reachmap workspace-scan
+      reachmap heatmap
+      reachmap place-bin
+      reachmap bin-scan
+      reachmap rank grasps.json
+    """
+
+
+def main() -> NoReturn:
+    """Run the command line and exit with the code of the table in ``failures``."""
+    group.main(prog_name="reachmap")
+    raise AssertionError("unreachable")

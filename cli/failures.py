@@ -1,0 +1,114 @@
+"""How a command line ends: the one place where errors become lines and exit codes.
+
+===== ==========================================================================
+Code  Meaning
+===== ==========================================================================
+0     done
+1     done, but a gate that was asked for did not hold (``--fail-under``)
+2     wrong usage or wrong input; nothing was changed
+3     unfinished; the same command resumes
+70    an internal error; ``--debug`` shows where
+130   interrupted
+141   the reader of stdout went away (``| head``)
+===== ==========================================================================
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import traceback
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import click
+
+from reachmap.errors import ReachmapError
+
+INTERNAL_ERROR = 70
+INTERRUPTED = 130
+PIPE_CLOSED = 141
+
+
+@dataclass(slots=True, kw_only=True)
+class RunState:
+    """What ``-v``, ``-q`` and ``--debug`` said; the context object of the group."""
+
+    debug: bool = False
+    verbosity: int = 0
+
+
+def exit_code_of(run: Callable[[], Any], state: RunState) -> int:
+    """Run a command line; report what went wrong on stderr.
+
+    Parameters
+    ----------
+    run : callable
+        Invokes click without its own error handling; an int it returns is the code
+        of ``ctx.exit``.
+    state : RunState
+        Filled in while ``run`` parses its options.
+
+    Returns
+    -------
+    int
+        Exit code, see the table of this module.
+    """
+    try:
+        result = run()
+        sys.stdout.flush()
+    except SystemExit as error:
+        # click turns a closed pipe into an exit of its own.
+        if isinstance(error.__context__, BrokenPipeError):
+            return _pipe_closed()
+        return error.code if isinstance(error.code, int) else INTERNAL_ERROR
+    except BrokenPipeError:
+        return _pipe_closed()
+    except click.ClickException as error:
+        error.show()
+        return error.exit_code
+    except (click.Abort, KeyboardInterrupt) as error:
+        return _interrupted(error)
+    except ReachmapError as error:
+        _report(error.lines, state)
+        return error.exit_code
+    except Exception as error:
+        _report(_internal_lines(error, state), state)
+        return INTERNAL_ERROR
+    return result if isinstance(result, int) else 0
+
+
+def _report(lines: Iterable[str], state: RunState) -> None:
+    if state.debug:
+        traceback.print_exc()
+    for line in lines:
+        click.echo(f"reachmap: {line}", err=True)
+
+
+def _internal_lines(error: Exception, state: RunState) -> list[str]:
+    kind = type(error).__name__
+    summary = (str(error).strip().splitlines() or ["no message"])[0]
+    hint = "" if state.debug else " (add --debug for the traceback)"
+    return [f"internal error: {kind}: {summary}{hint}"]
+
+
+def _interrupted(error: BaseException) -> int:
+    # click hides the interrupt, and what it says about resuming, behind an Abort.
+    cause = error.__cause__ if isinstance(error, click.Abort) else error
+    message = str(cause or "").strip() or "interrupted"
+    for line in message.splitlines():
+        click.echo(f"reachmap: {line}", err=True)
+    return INTERRUPTED
+
+
+def _pipe_closed() -> int:
+    # Python flushes stdout once more at exit; give it a place where that works.
+    devnull = os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(devnull, sys.stdout.fileno())
+    except (OSError, ValueError):
+        pass  # a captured stdout has no descriptor
+    finally:
+        os.close(devnull)
+    return PIPE_CLOSED

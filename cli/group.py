@@ -1,0 +1,91 @@
+"""The group of all subcommands: lazy, in sections, with one place for failures."""
+
+from __future__ import annotations
+
+import difflib
+import sys
+from collections.abc import Sequence
+from importlib import import_module
+from typing import Any
+
+import click
+from click.shell_completion import CompletionItem
+
+from reachmap.cli.failures import RunState, exit_code_of
+from reachmap.cli.table import COMMANDS, Entry, sections
+from reachmap.cli.verbosity import verbosity_parameters
+
+
+class PipelineGroup(click.Group):
+    """A click group that knows its commands by table and imports them on use."""
+
+    def __init__(
+        self, *, table: dict[str, Entry] | None = None, **settings: Any
+    ) -> None:
+        super().__init__(**settings)
+        self.table = COMMANDS if table is None else table
+        self.params.extend(verbosity_parameters())
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Names in the order of the pipeline, without those not installed."""
+        return [name for name, entry in self.table.items() if entry.is_available()]
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """Import a command by name; every one also takes -v, -q and --debug."""
+        entry = self.table.get(cmd_name)
+        if entry is None or not entry.is_available():
+            return None
+        command: click.Command = import_module(entry.module).command
+        if not any(parameter.name == "verbose" for parameter in command.params):
+            command.params.extend(verbosity_parameters())
+        return command
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """Find the command, or say which names come close."""
+        if args and not args[0].startswith("-") and args[0] not in self.table:
+            names = self.list_commands(ctx)
+            close = difflib.get_close_matches(args[0], names, n=2, cutoff=0.5)
+            hint = f" Did you mean {' or '.join(close)}?" if close else ""
+            ctx.fail(f"No such command {args[0]!r}.{hint}")
+        return super().resolve_command(ctx, args)
+
+    def format_commands(
+        self, ctx: click.Context, formatter: click.HelpFormatter
+    ) -> None:
+        """Write the commands by section, from the table: nothing is imported."""
+        for section, rows in sections(self.table).items():
+            with formatter.section(section):
+                formatter.write_dl(rows, col_max=16)
+
+    def shell_complete(
+        self, ctx: click.Context, incomplete: str
+    ) -> list[CompletionItem]:
+        """Complete names from the table, options from click."""
+        names = [
+            CompletionItem(name, help=self.table[name].help)
+            for name in self.list_commands(ctx)
+            if name.startswith(incomplete)
+        ]
+        return names + click.Command.shell_complete(self, ctx, incomplete)
+
+    def main(  # type: ignore[override]
+        self,
+        args: Sequence[str] | None = None,
+        prog_name: str | None = None,
+        *,
+        standalone_mode: bool = True,
+        **extra: Any,
+    ) -> Any:
+        """Run a command line; unless told otherwise, exit with its documented code."""
+        if not standalone_mode:
+            return super().main(args, prog_name, standalone_mode=False, **extra)
+        state = RunState()
+
+        def run() -> Any:
+            return super(PipelineGroup, self).main(
+                args, prog_name, standalone_mode=False, obj=state, **extra
+            )
+
+        sys.exit(exit_code_of(run, state))

@@ -1,0 +1,210 @@
+"""Options that several commands share, as values, so that they read alike everywhere.
+
+====================  ======================================  =======================
+Option                Parameter of the command                Commands
+====================  ======================================  =======================
+``CELL``              ``cell: str``                           workspace-scan, check
+``--cell``            ``cell: str | None``                    bin-scan, rank
+``--set``             ``overrides: tuple[str, ...]``          all that read a cell
+``--seed``            ``seed: int | None``                    scans, validate
+``-j``, ``--workers`` ``workers: int``                        scans, place-bin
+``--executor``        ``executor: str``                       scans
+``--shard``           ``shard: tuple[int, int] | None``       scans
+``--restart``         ``restart: bool``                       scans
+``--dry-run``         ``dry_run: bool``                       scans
+``--progress``        ``progress: bool``                      scans, place-bin
+``-o``, ``--output``  ``output: Path`` (see output_option)    all that write
+``--overwrite``       ``overwrite: bool``                     all that write
+``--json``            ``as_json: bool``                       all that answer
+``-v``, ``-q``        none, kept by the group                 every command, by itself
+``--debug``           none, kept by the group                 every command, by itself
+====================  ======================================  =======================
+
+A value comes from the command line, else from the environment variable
+``REACHMAP_<COMMAND>_<PARAMETER>`` (``REACHMAP_BIN_SCAN_WORKERS``), else, where the
+table of :data:`FOR_ALL` has it, from one variable for every command
+(``REACHMAP_WORKERS``), else from the cell or the default.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+
+import click
+
+Decorated = TypeVar("Decorated", bound=Callable[..., Any])
+Decorator = Callable[[Decorated], Decorated]
+
+DEFAULT_CELL = "ur5-eye-in-hand"
+FOR_ALL = frozenset({"cell", "workers", "executor", "progress"})
+
+INPUT_FILE = click.Path(path_type=Path)
+OUTPUT_PATH = click.Path(path_type=Path)
+
+
+class SharedOption(click.Option):
+    """An option whose variable for one command wins over the one for all."""
+
+    def resolve_envvar_value(self, ctx: click.Context) -> str | None:
+        """Value from the environment: the command's own variable, else for all."""
+        own = super().resolve_envvar_value(ctx)
+        if own is None and self.name in FOR_ALL:
+            own = os.environ.get(f"REACHMAP_{self.name.upper()}") or None
+        return own
+
+
+def parse_shard(
+    ctx: click.Context, parameter: click.Parameter, value: str | None
+) -> tuple[int, int] | None:
+    """Turn ``I/N`` into (I, N): the I-th of N shards, counted from 1."""
+    if value is None:
+        return None
+    first, slash, second = value.partition("/")
+    if slash and value.isascii() and first.isdigit() and second.isdigit():
+        index, count = int(first), int(second)
+        if 1 <= index <= count:
+            return index, count
+    raise click.BadParameter(f"{value!r} is not I/N with 1 <= I <= N, such as 3/8.")
+
+
+def available_cores() -> int:
+    """Cores this process may use, which in a container is fewer than there are."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def _option(*declarations: str, **settings: Any) -> Decorator[Any]:
+    return click.option(*declarations, cls=SharedOption, **settings)
+
+
+cell_argument = click.argument("cell", default=DEFAULT_CELL, metavar="[CELL]")
+
+cell_option = _option(
+    "--cell",
+    metavar="CELL",
+    help="A shipped cell by name (see reachmap cells), or the path of a cell file.",
+)
+
+set_option = _option(
+    "--set",
+    "overrides",
+    multiple=True,
+    metavar="KEY=VALUE",
+    help="Override one value of the cell, as in bin_scan.repeats=1. Repeatable; "
+    "recorded in the result.",
+)
+
+seed_option = _option(
+    "--seed",
+    type=click.IntRange(min=0),
+    help="Seed of everything random; by default the cell's.",
+)
+
+workers_option = _option(
+    "-j",
+    "--workers",
+    type=click.IntRange(min=1),
+    default=available_cores,
+    show_default="all cores",
+    help="Worker processes; 1 works in this process.",
+)
+
+executor_option = _option(
+    "--executor",
+    default="processes",
+    show_default=True,
+    metavar="NAME",
+    help="Where the work runs: processes, dask:local or dask:tcp://HOST:PORT.",
+)
+
+shard_option = _option(
+    "--shard",
+    callback=parse_shard,
+    metavar="I/N",
+    help="Do only the I-th of N shares of the work and leave a journal for "
+    "reachmap merge.",
+)
+
+restart_option = _option(
+    "--restart",
+    is_flag=True,
+    help="Discard the journal of an earlier run and begin again.",
+)
+
+dry_run_option = _option(
+    "--dry-run",
+    is_flag=True,
+    help="Say what would be done, and how long it would take; write nothing.",
+)
+
+progress_option = _option(
+    "--progress/--no-progress",
+    default=True,
+    help="Report progress on stderr: a bar on a terminal, else a line now and then.",
+)
+
+overwrite_option = _option(
+    "--overwrite", is_flag=True, help="Replace the output if it exists."
+)
+
+json_option = _option(
+    "--json",
+    "as_json",
+    is_flag=True,
+    help="Answer with exactly one JSON object on stdout.",
+)
+
+
+def output_option(
+    default: str | None = None, *, required: bool = False, help: str | None = None
+) -> Decorator[Any]:
+    """``-o/--output PATH`` with the command's own default name.
+
+    Parameters
+    ----------
+    default : str, optional
+        Name in the current folder, such as ``"bin.h5"``; None leaves it to the tool.
+    required : bool
+        Whether the command has no sensible default.
+    help : str, optional
+        What is written there, where "Write the result here." is too vague.
+    """
+    return _option(
+        "-o",
+        "--output",
+        type=OUTPUT_PATH,
+        default=default,
+        show_default=default is not None,
+        required=required,
+        metavar="PATH",
+        help=help or "Write the result here.",
+    )
+
+
+def compose(*decorators: Decorator[Any]) -> Decorator[Any]:
+    """Join decorators into one; their options appear in the order given."""
+
+    def decorate(function: Any) -> Any:
+        for decorator in reversed(decorators):
+            function = decorator(function)
+        return function
+
+    return decorate
+
+
+scan_options = compose(
+    set_option,
+    seed_option,
+    workers_option,
+    executor_option,
+    shard_option,
+    restart_option,
+    overwrite_option,
+    dry_run_option,
+    progress_option,
+    json_option,
+)

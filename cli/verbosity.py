@@ -1,0 +1,72 @@
+"""``-v``, ``-q`` and ``--debug``: accepted before and after the command's name."""
+
+from __future__ import annotations
+
+import logging
+import sys
+
+import click
+
+from reachmap.cli.failures import RunState
+
+LEVELS = (logging.ERROR, logging.WARNING, logging.INFO, logging.DEBUG)
+NORMAL = LEVELS.index(logging.WARNING)
+
+
+class _StderrHandler(logging.StreamHandler):  # type: ignore[type-arg]
+    """Writes to whatever ``sys.stderr`` is at the time of writing."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Follow a stderr that was replaced since the handler was made."""
+        self.stream = sys.stderr
+        super().emit(record)
+
+
+def configure_logging(verbosity: int) -> None:
+    """Send the package's log to stderr; 0 shows warnings, each step shows more."""
+    logger = logging.getLogger("reachmap")
+    logger.setLevel(LEVELS[min(max(NORMAL + verbosity, 0), len(LEVELS) - 1)])
+    if not any(isinstance(handler, _StderrHandler) for handler in logger.handlers):
+        handler = _StderrHandler()
+        handler.setFormatter(logging.Formatter("reachmap: %(message)s"))
+        logger.addHandler(handler)
+
+
+def _count(ctx: click.Context, parameter: click.Parameter, value: int) -> None:
+    state = ctx.find_root().obj
+    if isinstance(state, RunState) and value:
+        state.verbosity += value if parameter.name == "verbose" else -value
+        configure_logging(state.verbosity)
+
+
+def _debug(ctx: click.Context, parameter: click.Parameter, value: bool) -> None:
+    state = ctx.find_root().obj
+    if isinstance(state, RunState) and value:
+        state.debug = True
+
+
+def verbosity_parameters() -> list[click.Parameter]:
+    """Fresh ``-v``, ``-q`` and ``--debug`` that no command has to receive."""
+    return [
+        click.Option(
+            ["-v", "--verbose"],
+            count=True,
+            expose_value=False,
+            callback=_count,
+            help="Say more on stderr; -vv says most.",
+        ),
+        click.Option(
+            ["-q", "--quiet"],
+            count=True,
+            expose_value=False,
+            callback=_count,
+            help="Say less on stderr.",
+        ),
+        click.Option(
+            ["--debug"],
+            is_flag=True,
+            expose_value=False,
+            callback=_debug,
+            help="Show the traceback of an error.",
+        ),
+    ]

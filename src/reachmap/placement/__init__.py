@@ -1,0 +1,1 @@
+"""Where to put the bin, and the configuration it is imaged from."""

@@ -1,0 +1,1 @@
+"""Pictures of the maps, drawn without pyplot and without a display."""

@@ -1,0 +1,1 @@
+"""Grasp lists, the nearest test grasp, the cost J, the re-ordering."""

@@ -1,0 +1,1 @@
+"""Where to look: lattices of points, families of tool orientations."""

@@ -1,0 +1,1 @@
+"""Running many tasks: units of work, workers, journal, progress."""
