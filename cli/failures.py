@@ -31,6 +31,10 @@ INTERRUPTED = 130
 PIPE_CLOSED = 141
 
 
+class PipeClosedError(Exception):
+    """Stands in for BrokenPipeError, which click would turn into exit code 1."""
+
+
 @dataclass(slots=True, kw_only=True)
 class RunState:
     """What ``-v``, ``-q`` and ``--debug`` said; the context object of the group."""
@@ -58,12 +62,7 @@ def exit_code_of(run: Callable[[], Any], state: RunState) -> int:
     try:
         result = run()
         sys.stdout.flush()
-    except SystemExit as error:
-        # click turns a closed pipe into an exit of its own.
-        if isinstance(error.__context__, BrokenPipeError):
-            return _pipe_closed()
-        return error.code if isinstance(error.code, int) else INTERNAL_ERROR
-    except BrokenPipeError:
+    except (BrokenPipeError, PipeClosedError):
         return _pipe_closed()
     except click.ClickException as error:
         error.show()

@@ -11,9 +11,9 @@ from typing import Any
 import click
 from click.shell_completion import CompletionItem
 
-from reachmap.cli.failures import RunState, exit_code_of
+from reachmap.cli.failures import PipeClosedError, RunState, exit_code_of
 from reachmap.cli.table import COMMANDS, Entry, sections
-from reachmap.cli.verbosity import verbosity_parameters
+from reachmap.cli.verbosity import configure_logging, verbosity_parameters
 
 
 class PipelineGroup(click.Group):
@@ -46,8 +46,8 @@ class PipelineGroup(click.Group):
         """Find the command, or say which names come close."""
         if args and not args[0].startswith("-") and args[0] not in self.table:
             names = self.list_commands(ctx)
-            close = difflib.get_close_matches(args[0], names, n=2, cutoff=0.5)
-            hint = f" Did you mean {' or '.join(close)}?" if close else ""
+            close = difflib.get_close_matches(args[0], names, n=1)
+            hint = f" Did you mean {close[0]}?" if close else ""
             ctx.fail(f"No such command {args[0]!r}.{hint}")
         return super().resolve_command(ctx, args)
 
@@ -70,6 +70,13 @@ class PipelineGroup(click.Group):
         ]
         return names + click.Command.shell_complete(self, ctx, incomplete)
 
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run the command; a closed pipe is told apart from a failure."""
+        try:
+            return super().invoke(ctx)
+        except BrokenPipeError as error:
+            raise PipeClosedError from error
+
     def main(  # type: ignore[override]
         self,
         args: Sequence[str] | None = None,
@@ -82,6 +89,7 @@ class PipelineGroup(click.Group):
         if not standalone_mode:
             return super().main(args, prog_name, standalone_mode=False, **extra)
         state = RunState()
+        configure_logging(state.verbosity)
 
         def run() -> Any:
             return super(PipelineGroup, self).main(
