@@ -1,0 +1,90 @@
+"""Shortening of a found path.
+
+First every way-point that can be skipped is skipped, looking from the far end by
+halving; then random pairs of points on the path are joined where that is shorter
+(Geraerts and Overmars, "Creating high-quality paths for motion planning", 2007). The
+work is counted in tries, so the result depends on the seed alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from reachmap._typing import FloatArray
+
+MotionTest = Callable[[FloatArray, FloatArray], bool]
+_LEAST_GAIN_RAD = 1e-3
+
+
+def shorten(
+    path: FloatArray,
+    is_free: MotionTest,
+    *,
+    tries: int,
+    rng: np.random.Generator,
+) -> FloatArray:
+    """Skip way-points, then cut corners.
+
+    Parameters
+    ----------
+    path : array, shape (n, dof)
+    is_free : callable
+        ``is_free(q_from, q_to)`` of a straight motion.
+    tries : int
+        Corners that are tried.
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    array, shape (m, dof)
+        Ends unchanged, never longer.
+    """
+    return cut_corners(skip_waypoints(path, is_free), is_free, tries=tries, rng=rng)
+
+
+def skip_waypoints(path: FloatArray, is_free: MotionTest) -> FloatArray:
+    """Join each way-point to the furthest later one that halving finds."""
+    kept = list(path)
+    start = 0
+    while start < len(kept) - 2:
+        target = len(kept) - 1
+        while target > start + 1:
+            if is_free(kept[start], kept[target]):
+                del kept[start + 1 : target]
+                break
+            target = start + 1 + (target - start - 1) // 2
+        start += 1
+    return np.array(kept)
+
+
+def cut_corners(
+    path: FloatArray, is_free: MotionTest, *, tries: int, rng: np.random.Generator
+) -> FloatArray:
+    """Join random pairs of points on the path where that shortens it."""
+    for cut in rng.random((tries, 2)):
+        if len(path) < 3:
+            break
+        arc = np.concatenate(
+            [[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))]
+        )
+        begin, end = np.sort(cut) * arc[-1]
+        first, last = (
+            np.searchsorted(arc, (begin, end), side="right").clip(1, len(path) - 1) - 1
+        )
+        if first == last:
+            continue
+        q_from = _point_at(path, arc, first, begin)
+        q_to = _point_at(path, arc, last, end)
+        gain = (end - begin) - float(np.linalg.norm(q_to - q_from))
+        if gain > _LEAST_GAIN_RAD and is_free(q_from, q_to):
+            path = np.vstack([path[: first + 1], q_from, q_to, path[last + 1 :]])
+    return path
+
+
+def _point_at(
+    path: FloatArray, arc: FloatArray, segment: int, position: float
+) -> FloatArray:
+    share = (position - arc[segment]) / max(arc[segment + 1] - arc[segment], 1e-12)
+    return np.asarray(path[segment] + share * (path[segment + 1] - path[segment]))
