@@ -1,0 +1,116 @@
+# reachmap: from a clean machine to ranked grasps, and the checks of the project.
+# The same targets serve a person, a hook and CI.
+
+PYTHON ?= python3
+VENV   ?= .venv
+JOBS   ?= 2
+# The pipeline: which cell, which grasps, where the results go, and how much of it.
+CELL   ?= ur5-eye-in-hand
+GRASPS ?= examples/pile-1.json
+RUN    ?= run
+WORKERS ?= $(JOBS)
+# Sizes of a quick look; `make SIZE=` or `make paper` uses the cell's own.
+SIZE   ?= --set bin_scan.repeats=2 --set bin_scan.grid=[10,7]
+
+BIN      := $(VENV)/bin
+PIP      := $(BIN)/python -m pip --disable-pip-version-check --quiet
+REACHMAP := $(BIN)/reachmap
+SCAN     := -j $(WORKERS) --overwrite
+RESULTS  := $(RUN)/.heatmaps $(RUN)/ranked.json $(RUN)/report.html
+
+.DEFAULT_GOAL := run
+.DELETE_ON_ERROR:
+.PHONY: help run paper install dev test test-slow lint check docs bench wheel view \
+        clean clean-run
+
+help: ## Show this list
+	@awk 'BEGIN {FS = ":.*## "} /^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+
+run: $(RESULTS) ## Install, then scan, place, scan and rank on the shipped cell (default)
+	@echo "Done: heat maps, placement, bin map, $(RUN)/ranked.json and $(RUN)/report.html."
+
+paper: ## The same at the full sizes of the paper, into run/paper
+	@$(MAKE) --no-print-directory run RUN=run/paper SIZE=
+
+install: $(VENV)/.runtime ## Create the virtual environment and install reachmap
+dev: $(VENV)/.dev ## Add what tests, checks and documentation need
+
+test: $(VENV)/.dev ## Run the default test suite
+	$(BIN)/python -m pytest -n $(JOBS)
+
+test-slow: $(VENV)/.dev ## Run the tests that take minutes
+	$(BIN)/python -m pytest -n $(JOBS) -m slow
+
+lint: $(VENV)/.dev view ## Format, lint, types, architecture
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/python -m pytest -q tests/architecture
+
+check: lint docs ## All checks that are not tests
+
+docs: $(VENV)/.dev ## Build the documentation into build/docs; warnings are errors
+	$(BIN)/python -m sphinx -W --keep-going -q -b html docs build/docs
+	@echo "Open build/docs/index.html"
+
+bench: $(VENV)/.dev ## Run the benchmarks, one after the other
+	@set -e; for script in benchmarks/bench_*.py; do \
+	    echo "== $$script"; $(BIN)/python $$script; done
+
+wheel: $(VENV)/.dev ## Build sdist and wheel into dist/
+	rm -rf build/lib build/bdist.*
+	$(BIN)/python -m build --outdir dist .
+
+view: ## Symlinks that show the installed package layout to type checkers
+	@mkdir -p build/view/reachmap
+	@cd build/view/reachmap && find . -xtype l -delete && \
+	    ln -sfn ../../../cli cli && ln -sfn ../../../cells cells && \
+	    for entry in ../../../src/reachmap/[a-z_]*; do \
+	        case $$entry in *__pycache__) ;; *) ln -sfn $$entry . ;; esac; done
+
+clean: ## Remove what was built; keep the environment and the results
+	rm -rf build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis htmlcov
+	find . -path ./$(VENV) -prune -o -name __pycache__ -type d -exec rm -rf {} +
+
+clean-run: ## Remove the results of the pipeline
+	rm -rf run
+
+# --- environment ------------------------------------------------------------------
+
+$(BIN)/python:
+	@$(PYTHON) -c 'import sys; v = sys.version_info[:2]; sys.exit(0 if (3, 11) <= v < (3, 14) \
+	    else "reachmap needs Python 3.11, 3.12 or 3.13; set PYTHON=python3.12, say")'
+	$(PYTHON) -m venv $(VENV)
+	$(PIP) install --upgrade pip
+
+$(VENV)/.runtime: pyproject.toml | $(BIN)/python
+	@echo "Installing reachmap and its engines (about 1 GB, a minute or two) ..."
+	$(PIP) install --editable .
+	@touch $@
+
+$(VENV)/.dev: pyproject.toml | $(BIN)/python
+	@echo "Installing reachmap for development (a minute or two) ..."
+	$(PIP) install --editable '.[dev]'
+	@touch $(VENV)/.runtime $@
+
+# --- pipeline: every file is one command, and make knows what is up to date ---------
+
+$(RUN)/workspace.h5: $(wildcard cells/$(CELL).yaml $(CELL)) | $(VENV)/.runtime
+	@mkdir -p $(RUN)
+	$(REACHMAP) workspace-scan $(CELL) $(SIZE) $(SCAN) -o $@
+
+$(RUN)/.heatmaps: $(RUN)/workspace.h5
+	$(REACHMAP) heatmap $< -o $(RUN)/heatmaps --overwrite
+	@touch $@
+
+$(RUN)/placement.h5: $(RUN)/workspace.h5
+	$(REACHMAP) place-bin $< -o $@ --overwrite
+
+$(RUN)/bin.h5: $(RUN)/placement.h5
+	$(REACHMAP) bin-scan $< $(SCAN) -o $@
+
+$(RUN)/ranked.json: $(RUN)/bin.h5 $(GRASPS)
+	$(REACHMAP) rank $(GRASPS) --map $< --chart $(RUN)/ranking.png -o $@ --overwrite
+
+$(RUN)/report.html: $(RUN)/ranked.json $(RUN)/.heatmaps
+	$(REACHMAP) report $(RUN) -o $@ --overwrite

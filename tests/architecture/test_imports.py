@@ -1,0 +1,219 @@
+"""The shape of the package: imports point down, each engine has one home."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+TREES = {"reachmap": ROOT / "src" / "reachmap", "reachmap.cli": ROOT / "cli"}
+
+# A package may import its own level and those below; the next test forbids cycles.
+LEVELS = {
+    "_typing": 0, "errors": 0, "geometry": 0, "__init__": 0,
+    "cell": 1, "sampling": 1, "maps": 1, "cells": 1,
+    "core": 2,
+    "scans": 3, "placement": 3, "ranking": 3, "plots": 3, "view": 3,
+    "tools": 4,
+    "cli": 5, "__main__": 6,
+}  # fmt: skip
+
+# Engine -> the modules that may import it, as prefixes.
+HOMES = {
+    "pinocchio": ("reachmap.core.",),
+    "coal": ("reachmap.core.",),
+    "hppfcl": (),
+    "eaik": ("reachmap.core.",),
+    "ompl": ("reachmap.core.planning", "reachmap.core.ompl"),
+    "h5py": ("reachmap.maps.",),
+    "matplotlib": ("reachmap.plots.",),
+    "click": ("reachmap.cli",),
+    "viser": ("reachmap.view.",),
+    "trimesh": ("reachmap.view.",),
+    "xacrodoc": ("reachmap.cell.",),
+    "ruamel": ("reachmap.cell.", "reachmap.ranking."),
+    "distributed": ("reachmap.scans.",),
+    "dask": ("reachmap.scans.",),
+}
+# Never: they run what a file says, or hide what they import.
+BANNED_MODULES = {"pickle", "marshal", "shelve", "dill", "cloudpickle", "yaml", "imp"}
+BANNED_CALLS = {"eval", "exec", "print", "breakpoint"}
+
+
+@dataclass(frozen=True)
+class Module:
+    """One source file, parsed."""
+
+    name: str
+    path: Path
+    tree: ast.Module
+
+    @property
+    def package(self) -> str:
+        """First name below `reachmap`."""
+        return self.name.split(".")[1] if "." in self.name else "__init__"
+
+
+def modules() -> Iterator[Module]:
+    """Every module of the library and of the command line."""
+    for prefix, folder in TREES.items():
+        for path in sorted(folder.rglob("*.py")):
+            parts = path.relative_to(folder).with_suffix("").parts
+            names = [prefix, *(part for part in parts if part != "__init__")]
+            yield Module(".".join(names), path, ast.parse(path.read_text()))
+
+
+MODULES = {module.name: module for module in modules()}
+each_module = pytest.mark.parametrize("module", MODULES.values(), ids=MODULES.keys())
+
+
+def imported(tree: ast.AST) -> Iterator[tuple[str, int]]:
+    """Names of imported modules, with their lines; `from a import b` gives `a.b`."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            yield from ((alias.name, node.lineno) for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"line {node.lineno}: import absolutely"
+            assert node.module is not None
+            yield from ((f"{node.module}.{a.name}", node.lineno) for a in node.names)
+
+
+def imported_on_loading(module: Module) -> set[str]:
+    """Modules of this project that are imported together with this one."""
+
+    class Top(ast.NodeVisitor):
+        def __init__(self) -> None:
+            self.names: list[str] = []
+
+        def visit_FunctionDef(self, node: ast.FunctionDef) -> None: ...
+
+        def visit_If(self, node: ast.If) -> None:
+            if "TYPE_CHECKING" not in ast.unparse(node.test):
+                self.generic_visit(node)
+
+        def generic_visit(self, node: ast.AST) -> None:
+            if isinstance(node, ast.Import | ast.ImportFrom):
+                self.names += [name for name, _ in imported(node)]
+            super().generic_visit(node)
+
+    top = Top()
+    top.visit(module.tree)
+    return {found for name in top.names if (found := owner(name))} - {module.name}
+
+
+def owner(name: str) -> str | None:
+    """The module of this project that a dotted name lives in."""
+    while name:
+        if name in MODULES:
+            return name
+        name = name.rpartition(".")[0]
+    return None
+
+
+def closure(name: str) -> set[str]:
+    """Everything of this project that comes along when a module is imported."""
+    seen: set[str] = set()
+    waiting = [name]
+    while waiting:
+        current = waiting.pop()
+        if current not in seen:
+            seen.add(current)
+            parents = [current.rpartition(".")[0]] if "." in current else []
+            waiting += [*imported_on_loading(MODULES[current]), *parents]
+    return seen
+
+
+@each_module
+def test_imports_point_down(module: Module) -> None:
+    """Each package imports from its own level or from those below, never upwards."""
+    level = LEVELS[module.package]
+    upward = [
+        f"line {line}: {name}"
+        for name, line in imported(module.tree)
+        if name.startswith("reachmap.") and LEVELS.get(name.split(".")[1], 0) > level
+    ]
+    assert not upward
+
+
+def test_packages_do_not_import_each_other_in_circles() -> None:
+    """Packages of one level may use each other, in one direction."""
+    edges: dict[str, set[str]] = {}
+    for module in MODULES.values():
+        names = {
+            name.split(".")[1]
+            for name, _ in imported(module.tree)
+            if name.startswith("reachmap.")
+        }
+        known = {name for name in names if name in LEVELS}
+        edges.setdefault(module.package, set()).update(known - {module.package})
+
+    def reach(start: str) -> set[str]:
+        seen: set[str] = set()
+        waiting = list(edges.get(start, ()))
+        while waiting:
+            name = waiting.pop()
+            if name not in seen:
+                seen.add(name)
+                waiting += edges.get(name, ())
+        return seen
+
+    circles = [name for name in edges if name in reach(name)]
+    assert not circles
+
+
+@each_module
+def test_each_engine_has_one_home(module: Module) -> None:
+    """Pinocchio in core, h5py in maps, click in cli: nobody else imports them."""
+    strays = [
+        f"line {line}: {name}"
+        for name, line in imported(module.tree)
+        if (homes := HOMES.get(name.partition(".")[0])) is not None
+        and not any(f"{module.name}.".startswith(home) for home in homes)
+    ]
+    assert not strays
+
+
+@each_module
+def test_nothing_runs_or_prints_what_a_file_says(module: Module) -> None:
+    """No pickle, no eval, no YAML tags, and no print below the command line."""
+    found = [
+        f"line {line}: import {name}"
+        for name, line in imported(module.tree)
+        if name.partition(".")[0] in BANNED_MODULES
+    ]
+    for node in ast.walk(module.tree):
+        if isinstance(node, ast.Call):
+            called = ast.unparse(node.func)
+            if called in BANNED_CALLS or called.endswith(("yaml.load", "pyplot")):
+                found.append(f"line {node.lineno}: {called}")
+            for keyword in node.keywords:
+                if (
+                    keyword.arg == "allow_pickle"
+                    and ast.unparse(keyword.value) != "False"
+                ):
+                    found.append(f"line {node.lineno}: allow_pickle")
+    assert not found
+
+
+@each_module
+def test_nothing_imports_pyplot(module: Module) -> None:
+    """It takes seconds to import and wants a display."""
+    assert not [
+        n for n, _ in imported(module.tree) if n.startswith("matplotlib.pyplot")
+    ]
+
+
+RANKING_WITHOUT = ("reachmap.core", "reachmap.scans", "reachmap.plots", "reachmap.view")
+
+
+@pytest.mark.parametrize("name", ["reachmap.tools.rank", "reachmap.ranking"])
+def test_ranking_is_a_look_up(name: str) -> None:
+    """What `rank` loads has no planner, no kinematics and no plots in it."""
+    if name not in MODULES:
+        pytest.skip("not there yet")
+    heavy = [found for found in closure(name) if found.startswith(RANKING_WITHOUT)]
+    assert not heavy
