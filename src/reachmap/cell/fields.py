@@ -80,7 +80,9 @@ class SphereShape(Record):
 class MeshShape(Record):
     """A triangle mesh: STL, OBJ, DAE or PLY."""
 
-    file: str = Field(min_length=1, description="package://, absolute or relative path.")
+    file: str = Field(
+        min_length=1, description="package://, absolute or relative path."
+    )
     scale: Positive | Size3 = Field(1.0, description="Factor to metres.")
 
 

@@ -29,7 +29,8 @@ class Resources(Record):
     """Where ``package://`` names are looked up, before the environment is."""
 
     packages: dict[str, str] = Field(
-        default_factory=dict, description="Package name to folder (relative to the cell)."
+        default_factory=dict,
+        description="Package name to folder (relative to the cell).",
     )
 
 
@@ -58,7 +59,9 @@ class IkSpec(Record):
     """How inverse kinematics is solved."""
 
     method: Literal["auto", "analytic", "numeric"] = "auto"
-    restarts: int = Field(32, ge=1, le=1000, description="Starts of the numeric solver.")
+    restarts: int = Field(
+        32, ge=1, le=1000, description="Starts of the numeric solver."
+    )
     redundant_joint: str | None = Field(
         None, description="Joint of a 7-axis arm that is sampled on a grid."
     )
@@ -76,7 +79,8 @@ class RobotSpec(Record):
         None, description="Joints that move; default: the chain from base to TCP."
     )
     locked_joints_deg: dict[str, Finite] = Field(
-        default_factory=dict, description="Positions of joints that do not move [deg or m]."
+        default_factory=dict,
+        description="Positions of joints that do not move [deg or m].",
     )
     base_frame: str | None = Field(
         None, description="URDF frame called robot_base; default: the root link."
@@ -158,7 +162,9 @@ class CubeSpec(Record):
     name: Annotated[str, Field(pattern=r"^[A-Za-z_]\w*$", max_length=40)]
     min: Vector3 = Field(description="Lowest corner, robot_base [m].")
     max: Vector3 = Field(description="Highest corner, robot_base [m].")
-    grid: tuple[Annotated[int, Field(ge=1, le=10000)], Annotated[int, Field(ge=1, le=10000)]]
+    grid: tuple[
+        Annotated[int, Field(ge=1, le=10000)], Annotated[int, Field(ge=1, le=10000)]
+    ]
 
     @model_validator(mode="after")
     def _corners_ordered(self) -> CubeSpec:
@@ -180,11 +186,14 @@ class WorkspaceScanSpec(Record):
 class BinScanSpec(Record):
     """The bin scan: test grasps inside the bin, and the pick they stand for."""
 
-    grid: tuple[Annotated[int, Field(ge=1, le=1000)], Annotated[int, Field(ge=1, le=1000)]] = (
-        Field((20, 14), description="Points along the bin's x and y.")
-    )
+    grid: tuple[
+        Annotated[int, Field(ge=1, le=1000)], Annotated[int, Field(ge=1, le=1000)]
+    ] = Field((20, 14), description="Points along the bin's x and y.")
     layers: tuple[NonNegative, ...] = Field(
-        (0.05,), min_length=1, max_length=64, description="Heights above the bottom [m]."
+        (0.05,),
+        min_length=1,
+        max_length=64,
+        description="Heights above the bottom [m].",
     )
     orientations: OrientationFamily = ConeFamily()
     repeats: int = Field(5, ge=1, le=255)

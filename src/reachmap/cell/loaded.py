@@ -1,0 +1,205 @@
+"""The loaded cell: description, texts and fingerprints, ready for workers."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from xml.sax.saxutils import quoteattr, unescape
+
+from reachmap._typing import FloatArray
+from reachmap.cell.fields import PoseSpec
+from reachmap.cell.files import body_key
+from reachmap.cell.joint_limits import MoveItLimits
+from reachmap.cell.model import Cell, ScanConfiguration
+from reachmap.cell.resources import NotFoundError, Resolver, search_folders
+from reachmap.cell.urdf import UrdfDescription, parse_urdf
+from reachmap.errors import CellError
+from reachmap.geometry import quaternion_wxyz_from_rotation
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LoadedCell:
+    """A cell with everything it refers to; pickles, and is what workers are sent.
+
+    Attributes
+    ----------
+    cell : Cell
+        The description after defaults and overrides. Group states, groups and MoveIt
+        limits are written out as ``scan_configuration.q_rad``, ``robot.joints`` and
+        ``robot.limits``; relative references are absolute.
+    source : str
+        Name or path as it was asked for.
+    directory : Path
+        Folder that relative references started from.
+    text : str
+        The YAML as read.
+    overrides : tuple of str
+    resolved_json : str
+        ``cell`` as JSON; :func:`reachmap.cell.loading.cell_from_json` reads it.
+    sha256 : str
+        Of the contents: the resolved cell with each file reference replaced by the
+        sha256 of the file. Equal on every machine.
+    urdf, srdf : str
+        Texts after xacro; ``srdf`` is "" where there is none.
+    files_sha256 : mapping
+        Mesh as the URDF names it, or ``body NAME: FILE``, to the sha256 of its bytes.
+    mesh_paths : mapping
+        The same keys to absolute paths.
+    joint_limits : mapping
+        Joint to :class:`MoveItLimits`, as read; already merged into ``cell``.
+    warnings : tuple of str
+        Things that are allowed but doubtful.
+    """
+
+    cell: Cell
+    source: str
+    directory: Path
+    text: str
+    overrides: tuple[str, ...] = ()
+    resolved_json: str
+    sha256: str
+    urdf: str
+    srdf: str = ""
+    files_sha256: Mapping[str, str] = dataclasses.field(default_factory=dict)
+    mesh_paths: Mapping[str, Path] = dataclasses.field(default_factory=dict)
+    joint_limits: Mapping[str, MoveItLimits] = dataclasses.field(default_factory=dict)
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def resolver(self) -> Resolver:
+        """Looks up references of the cell file."""
+        return Resolver(directory=self.directory, packages=self.cell.resources.packages)
+
+    @property
+    def package_dirs(self) -> tuple[str, ...]:
+        """Folders in which an engine may look for ``package://NAME``."""
+        named = [
+            (self.directory / folder).parent
+            for name, folder in self.cell.resources.packages.items()
+            if Path(folder).name == name
+        ]
+        return tuple(str(folder) for folder in [*named, *search_folders()])
+
+    @property
+    def robot(self) -> UrdfDescription:
+        """Structure of the URDF."""
+        return parse_urdf(self.urdf, self.cell.robot.urdf)
+
+    @property
+    def urdf_for_engine(self) -> str:
+        """URDF text with every collision mesh as an absolute path.
+
+        ``resources.packages`` may give a package a folder of another name, which no
+        list of package folders can express; this text needs none.
+        """
+        paths = {name: str(path) for name, path in self.mesh_paths.items()}
+        return _with_filenames(self.urdf, paths)
+
+    @property
+    def scan_configuration_rad(self) -> dict[str, float]:
+        """Joint name to position in the scan configuration [rad or m]."""
+        given = self.cell.scan_configuration
+        if given.q_rad is not None:
+            return dict(given.q_rad)
+        joints = self.robot.joints
+        return {
+            name: value if joints[name].type == "prismatic" else math.radians(value)
+            for name, value in (given.q_deg or {}).items()
+        }
+
+    def resolve(self, reference: str) -> Path:
+        """Absolute path of a file named in the cell file; CellError if none."""
+        try:
+            return self.resolver.resolve(reference)
+        except NotFoundError as error:
+            raise CellError(f"{self.source}: {error}") from None
+
+    def with_changes(
+        self,
+        *,
+        bin_pose: FloatArray | None = None,
+        scan_configuration_rad: Mapping[str, float] | None = None,
+    ) -> LoadedCell:
+        """Copy with another bin pose or scan configuration, and its own sha256.
+
+        Parameters
+        ----------
+        bin_pose : array, shape (4, 4), optional
+            T_base_bin.
+        scan_configuration_rad : mapping, optional
+            Joint name to position [rad or m].
+        """
+        cell = self.cell
+        if bin_pose is not None:
+            pose = PoseSpec(
+                xyz=tuple(float(v) for v in bin_pose[:3, 3]),
+                quaternion_wxyz=tuple(
+                    float(v) for v in quaternion_wxyz_from_rotation(bin_pose[:3, :3])
+                ),
+            )
+            cell = cell.model_copy(
+                update={"bin": cell.bin.model_copy(update={"pose": pose})}
+            )
+        if scan_configuration_rad is not None:
+            q = {name: float(value) for name, value in scan_configuration_rad.items()}
+            changed = ScanConfiguration(q_rad=q)
+            cell = cell.model_copy(update={"scan_configuration": changed})
+        return dataclasses.replace(
+            self,
+            cell=cell,
+            resolved_json=cell.model_dump_json(),
+            sha256=fingerprint(cell, self.urdf, self.srdf, self.files_sha256),
+        )
+
+
+def fingerprint(
+    cell: Cell, urdf: str, srdf: str, files_sha256: Mapping[str, str]
+) -> str:
+    """Sha256 of what a cell *is*, whatever its files are called and where they lie.
+
+    File references give way to the sha256 of their bytes; description, package
+    folders and xacro arguments, whose effect is in the URDF text, are left out.
+    """
+    data: dict[str, Any] = json.loads(cell.model_dump_json())
+    del data["description"], data["resources"]
+    robot = data["robot"]
+    del robot["xacro_args"], robot["joint_limits"], robot["group"]
+    hashes = {name: f"sha256:{digest}" for name, digest in files_sha256.items()}
+    robot["urdf"] = sha256_text(_with_filenames(urdf, hashes, bare_names=True))
+    robot["srdf"] = sha256_text(srdf) if srdf else None
+    for body in data["bodies"]:
+        mesh = body["shape"]["mesh"]
+        if mesh is not None:
+            mesh["file"] = files_sha256[body_key(body["name"], mesh["file"])]
+    text = json.dumps(data, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
+    return sha256_text(text)
+
+
+def sha256_text(text: str) -> str:
+    """Sha256 of a text in UTF-8, as 64 hexadecimal digits."""
+    return hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()
+
+
+def _with_filenames(
+    urdf: str, names: Mapping[str, str], *, bare_names: bool = False
+) -> str:
+    """URDF text whose ``filename`` attributes are replaced where ``names`` has them.
+
+    With ``bare_names`` the folders of all others are dropped.
+    """
+
+    def replace(match: re.Match[str]) -> str:
+        given = unescape(match[3], {"&quot;": '"', "&apos;": "'"})
+        name = names.get(given)
+        if name is None and bare_names:
+            name = given.rsplit("/", 1)[-1]
+        return match[0] if name is None else f"{match[1]}={quoteattr(name)}"
+
+    return re.sub(r"(\bfilename)(\s*=\s*[\"'])(.*?)[\"']", replace, urdf)

@@ -1,0 +1,291 @@
+"""From a YAML file, or from an artefact, to a :class:`LoadedCell`."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from reachmap.cell.files import (
+    CellFiles,
+    compare_hashes,
+    read_files,
+    stored_files,
+)
+from reachmap.cell.loaded import LoadedCell, fingerprint
+from reachmap.cell.messages import add_validation_errors
+from reachmap.cell.model import Cell
+from reachmap.cell.model_paths import did_you_mean
+from reachmap.cell.overrides import apply_overrides
+from reachmap.cell.references import check_names
+from reachmap.cell.resources import SCHEME, SHIPPED, Resolver, shipped_folder
+from reachmap.cell.yaml_text import (
+    MAX_TEXT_BYTES,
+    Document,
+    Place,
+    parse_yaml,
+    read_text,
+)
+from reachmap.errors import CellError
+
+__all__ = ["LoadedCell", "cell_from_json", "read_cell", "shipped_cells"]
+
+SUFFIXES = (".yaml", ".yml")
+MAX_JSON_BYTES = 4_000_000
+
+
+def shipped_cells() -> dict[str, Path]:
+    """Name to file of the cells shipped with reachmap, sorted by name."""
+    return {path.stem: path for path in sorted(shipped_folder().glob("*.yaml"))}
+
+
+def read_cell(name_or_path: str, overrides: Sequence[str] = ()) -> LoadedCell:
+    """Read a cell, with everything it refers to.
+
+    Parameters
+    ----------
+    name_or_path : str
+        Name of a shipped cell (``ur5-eye-in-hand``) or path of a YAML file.
+    overrides : sequence of str
+        ``key.path=value`` assignments, applied in order.
+
+    Raises
+    ------
+    CellError
+        Every mistake is a line ``file:line:column: key.path: …``.
+    """
+    path = _find(str(name_or_path))
+    text = read_text(path, limit=MAX_TEXT_BYTES)
+    return cell_from_text(
+        text,
+        label=str(path),
+        source=str(name_or_path),
+        directory=path.parent.absolute(),
+        overrides=overrides,
+    )
+
+
+def cell_from_text(
+    text: str,
+    *,
+    label: str,
+    directory: Path,
+    source: str | None = None,
+    overrides: Sequence[str] = (),
+) -> LoadedCell:
+    """Load a cell from YAML text.
+
+    Parameters
+    ----------
+    text : str
+    label : str
+        Name of the text in error messages.
+    directory : Path
+        Folder that relative references start from.
+    """
+    document = parse_yaml(text, label)
+    if not isinstance(document.data, dict):
+        raise CellError(f"{label}:1:1: expected a mapping with format: reachmap.cell")
+    apply_overrides(document, overrides, Cell)
+    cell = _validated(document)
+    files = read_files(document, directory)
+    if files.robot is not None:
+        check_names(document, files.robot, files.srdf_description)
+    document.raise_mistakes()
+    if cell is None or files.robot is None:
+        raise CellError(f"{label}: cannot be loaded")
+    resolved = _resolved(document, cell, files, directory)
+    return LoadedCell(
+        cell=resolved,
+        source=source or label,
+        directory=directory,
+        text=text,
+        overrides=tuple(overrides),
+        resolved_json=resolved.model_dump_json(),
+        sha256=fingerprint(resolved, files.urdf, files.srdf, files.files_sha256),
+        urdf=files.urdf,
+        srdf=files.srdf,
+        files_sha256=files.files_sha256,
+        mesh_paths=files.mesh_paths,
+        joint_limits=files.joint_limits,
+    )
+
+
+def _find(name_or_path: str) -> Path:
+    """Path of a cell file, or of the shipped cell of that name."""
+    path = Path(name_or_path)
+    if path.suffix in SUFFIXES or len(path.parts) > 1:
+        return path
+    cells = shipped_cells()
+    if name_or_path in cells:
+        return cells[name_or_path]
+    try:
+        if path.is_file():
+            return path
+    except (OSError, ValueError):
+        pass
+    hint = did_you_mean(name_or_path, tuple(cells))
+    raise CellError(f"{name_or_path!r:.120} is no shipped cell and no file; {hint}")
+
+
+def _validated(document: Document) -> Cell | None:
+    """The model of the document's data; None, with mistakes added, if it is wrong."""
+    try:
+        # Strict, and through JSON: quoted numbers and booleans in number fields are
+        # mistakes, while lists may still become tuples.
+        return Cell.model_validate_json(json.dumps(document.data), strict=True)
+    except ValidationError as error:
+        add_validation_errors(document, error, Cell)
+    except (ValueError, OverflowError, RecursionError) as error:
+        document.add((), f"cannot be read: {error}")
+    return None
+
+
+def _resolved(
+    document: Document, cell: Cell, files: CellFiles, directory: Path
+) -> Cell:
+    """The cell with SRDF names and MoveIt limits written out, paths absolute."""
+    data = cell.model_dump(mode="json")
+    robot = data["robot"]
+    resolver = files.resolver
+    data["resources"]["packages"] = {
+        name: str((directory / folder).absolute())
+        for name, folder in data["resources"]["packages"].items()
+    }
+    for key in ("urdf", "srdf", "joint_limits"):
+        if robot[key]:
+            robot[key] = _portable(robot[key], resolver)
+    for body in data["bodies"]:
+        if body["shape"]["mesh"]:
+            mesh = body["shape"]["mesh"]
+            mesh["file"] = _portable(mesh["file"], resolver)
+    _write_out_srdf(document, data, files)
+    _merge_limits(robot["limits"], files)
+    try:
+        return Cell.model_validate_json(json.dumps(data), strict=True)
+    except ValidationError as error:
+        add_validation_errors(document, error, Cell)
+        document.raise_mistakes()
+        raise
+
+
+def _portable(reference: str, resolver: Resolver) -> str:
+    """The reference as another folder can use it: package:// or absolute."""
+    if reference.startswith(SCHEME):
+        return reference
+    path = resolver.resolve(reference)
+    shipped = shipped_folder()
+    if path.is_relative_to(shipped):
+        return f"{SCHEME}{SHIPPED}/{path.relative_to(shipped).as_posix()}"
+    return str(path)
+
+
+def _write_out_srdf(document: Document, data: dict[str, Any], files: CellFiles) -> None:
+    """Replace group and group_state by the joints and positions they stand for."""
+    srdf, robot = files.srdf_description, files.robot
+    if srdf is None or robot is None:
+        return
+    cell_robot = data["robot"]
+    if cell_robot["group"] is not None:
+        locked = cell_robot["locked_joints_deg"]
+        names = [n for n in srdf.groups[cell_robot["group"]] if n not in locked]
+        if not names:
+            document.add(("robot", "group"), "the group has no joint that moves")
+        cell_robot["joints"] = cell_robot["joints"] or names
+        cell_robot["group"] = None
+    state = data["scan_configuration"]["group_state"]
+    if state is not None:
+        data["scan_configuration"] = {"q_rad": srdf.states[state]}
+    document.raise_mistakes()
+
+
+def _merge_limits(limits: dict[str, Any], files: CellFiles) -> None:
+    """Add the limits of the MoveIt file where the cell itself sets none."""
+    for key, name in (
+        ("velocity_rad_s", "velocity"),
+        ("acceleration_rad_s2", "acceleration"),
+    ):
+        if isinstance(limits[key], float):
+            continue
+        found = {
+            joint: value
+            for joint, limit in files.joint_limits.items()
+            if (value := getattr(limit, name)) is not None
+        }
+        limits[key] = {**found, **(limits[key] or {})} or None
+    joints = {} if files.robot is None else files.robot.joints
+    for joint, limit in files.joint_limits.items():
+        if limit.lower is None or limit.upper is None or joint not in joints:
+            continue
+        turn = joints[joint].type != "prismatic"
+        pair = [math.degrees(v) if turn else v for v in (limit.lower, limit.upper)]
+        limits["position_deg"].setdefault(joint, pair)
+
+
+def cell_from_json(
+    resolved_json: str,
+    *,
+    urdf: str,
+    srdf: str = "",
+    text: str = "",
+    overrides: Sequence[str] = (),
+    files_sha256: Mapping[str, str] | None = None,
+    source: str = "artefact",
+) -> LoadedCell:
+    """Load a cell from what an artefact keeps in ``/provenance``.
+
+    The robot description comes from the arguments; only meshes are looked for on
+    this machine, and they must be the ones that were used.
+
+    Parameters
+    ----------
+    resolved_json : str
+        ``cell_resolved_json``.
+    urdf, srdf, text : str
+        ``urdf``, ``srdf`` and ``cell_yaml``.
+    files_sha256 : mapping, optional
+        Mesh to expected sha256; not compared where omitted.
+    source : str
+        Name in error messages.
+
+    Raises
+    ------
+    CellError
+        The JSON is no cell, or a mesh is missing or has changed.
+    """
+    document = Document(source=source)
+    document.places[()] = Place(source=source)
+    if len(resolved_json) > MAX_JSON_BYTES:
+        raise CellError(f"{source}: the cell is larger than {MAX_JSON_BYTES:,} bytes")
+    try:
+        document.data = json.loads(resolved_json)
+    except (ValueError, RecursionError) as error:
+        raise CellError(f"{source}: the cell is not JSON: {error}") from None
+    if not isinstance(document.data, dict):
+        raise CellError(f"{source}: the cell is not a JSON object")
+    cell = _validated(document)
+    document.raise_mistakes()
+    if cell is None:
+        raise CellError(f"{source}: cannot be loaded")
+    files = stored_files(document, urdf=urdf, srdf=srdf)
+    if files.robot is not None:
+        check_names(document, files.robot, files.srdf_description)
+    compare_hashes(document, files, files_sha256 or {})
+    document.raise_mistakes()
+    return LoadedCell(
+        cell=cell,
+        source=source,
+        directory=files.resolver.directory,
+        text=text,
+        overrides=tuple(overrides),
+        resolved_json=cell.model_dump_json(),
+        sha256=fingerprint(cell, urdf, srdf, files.files_sha256),
+        urdf=urdf,
+        srdf=srdf,
+        files_sha256=files.files_sha256,
+        mesh_paths=files.mesh_paths,
+    )

@@ -1,0 +1,120 @@
+"""Validation errors in words: where, what was expected, what was found."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+from pydantic_core import ErrorDetails
+
+from reachmap.cell.model_paths import did_you_mean, known_keys
+from reachmap.cell.yaml_text import Document, Location
+
+_EXPECTED = {
+    "float_type": "a number",
+    "float_parsing": "a number",
+    "finite_number": "a finite number",
+    "int_type": "a whole number",
+    "int_parsing": "a whole number",
+    "int_parsing_size": "a whole number of at most 18 digits",
+    "int_from_float": "a whole number",
+    "string_type": "text",
+    "bool_type": "true or false",
+    "bool_parsing": "true or false",
+    "tuple_type": "a list",
+    "list_type": "a list",
+    "dict_type": "a mapping of names to values",
+    "model_type": "a mapping",
+    "model_attributes_type": "a mapping",
+    "none_required": "nothing",
+}
+_BOUNDS = {
+    "greater_than": ("a number > {}", "gt"),
+    "greater_than_equal": ("a number >= {}", "ge"),
+    "less_than": ("a number < {}", "lt"),
+    "less_than_equal": ("a number <= {}", "le"),
+    "string_too_short": ("text of at least {} characters", "min_length"),
+    "string_too_long": ("text of at most {} characters", "max_length"),
+    "string_pattern_mismatch": ("text that matches {}", "pattern"),
+}
+
+
+def add_validation_errors(
+    document: Document, error: ValidationError, model: type[BaseModel]
+) -> None:
+    """Add every problem of a pydantic error to the document as a mistake."""
+    for detail in error.errors(include_url=False):
+        location = strip_tags(detail["loc"], document.data, detail["type"])
+        of_key = detail["type"] == "extra_forbidden"
+        message = _sentence(detail, location, document.data, model)
+        document.add(location, message, of_key=of_key)
+
+
+def strip_tags(loc: tuple[str | int, ...], data: Any, kind: str) -> Location:
+    """Remove from a pydantic ``loc`` the union tags, which the user never wrote."""
+    kept: list[str | int] = []
+    for index, part in enumerate(loc):
+        inner = _member(data, part)
+        if inner is not _ABSENT:
+            kept.append(part)
+            data = inner
+        elif kind == "missing" and index == len(loc) - 1:
+            kept.append(part)
+    return tuple(kept)
+
+
+_ABSENT = object()
+
+
+def _member(data: Any, part: str | int) -> Any:
+    if isinstance(data, dict) and part in data:
+        return data[part]
+    if isinstance(data, list) and isinstance(part, int) and part < len(data):
+        return data[part]
+    return _ABSENT
+
+
+def _sentence(
+    detail: ErrorDetails, location: Location, data: Any, model: type[BaseModel]
+) -> str:
+    kind, context = detail["type"], detail.get("ctx", {})
+    found = f"(got {_short(detail['input'])})"
+    if kind == "missing":
+        return _missing(location, data)
+    if kind == "extra_forbidden":
+        hint = did_you_mean(str(location[-1]), known_keys(model, location[:-1]))
+        return f"unknown key; {hint}"
+    if kind in {"value_error", "assertion_error"}:
+        return str(context.get("error", detail["msg"]))
+    if kind in _EXPECTED:
+        return f"expected {_EXPECTED[kind]} {found}"
+    if kind in _BOUNDS:
+        words, key = _BOUNDS[kind]
+        return f"expected {words.format(context[key])} {found}"
+    if kind in {"too_short", "too_long"}:
+        few = kind == "too_short"
+        bound = context["min_length" if few else "max_length"]
+        return (
+            f"expected at {'least' if few else 'most'} {bound} values "
+            f"(got {context['actual_length']})"
+        )
+    if kind in {"literal_error", "enum"}:
+        return f"expected {context['expected']} {found}"
+    if kind in {"union_tag_invalid", "union_tag_not_found"}:
+        name = str(context["discriminator"]).strip("'")
+        wanted = context.get("expected_tags", "'cone', 'list'")
+        return f"expected a mapping with {name}: one of {wanted} {found}"
+    return f"{detail['msg']} {found}"
+
+
+def _missing(location: Location, data: Any) -> str:
+    if isinstance(location[-1], int):
+        for part in location[:-1]:
+            data = _member(data, part)
+        return f"a value is missing (got only {len(data)}: {_short(data)})"
+    return "is missing"
+
+
+def _short(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else f"{text[:57]}…"

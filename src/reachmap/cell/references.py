@@ -1,0 +1,185 @@
+"""Names and files a cell refers to: do they exist in the URDF and on disk?
+
+Works on the plain data of the file, not on the validated model, so that a missing
+mesh is reported together with a misspelt key.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from reachmap.cell.model_paths import did_you_mean
+from reachmap.cell.srdf import SrdfDescription
+from reachmap.cell.urdf import UrdfDescription
+from reachmap.cell.yaml_text import Document, Location
+
+WORLD = ("world", "robot_base")
+
+
+def at(data: Any, *location: str | int) -> Any:
+    """Member of nested data at a location, None where there is none."""
+    for part in location:
+        if isinstance(data, dict) and part in data:
+            data = data[part]
+        elif isinstance(data, list) and isinstance(part, int) and part < len(data):
+            data = data[part]
+        else:
+            return None
+    return data
+
+
+def text_at(data: Any, *location: str | int) -> str | None:
+    """Text at a location, None where there is no text."""
+    value = at(data, *location)
+    return value if isinstance(value, str) else None
+
+
+def entries(data: Any, *location: str | int) -> list[Any]:
+    """List at a location, empty where there is none."""
+    value = at(data, *location)
+    return value if isinstance(value, list) else []
+
+
+def check_names(
+    document: Document, robot: UrdfDescription, srdf: SrdfDescription | None
+) -> None:
+    """Add a mistake for every frame, joint, group or body that does not exist."""
+    _check_frames(document, robot)
+    _check_touch(document, robot)
+    _check_srdf_names(document, srdf)
+    moving: tuple[str, ...] | None = moving_joints(document.data, robot, srdf)
+    if not moving and document.mistakes:
+        moving = None  # a consequence of a mistake that is already listed
+    _check_joints(document, robot, moving)
+    if moving is not None:
+        _check_scan_configuration(document, moving)
+
+
+def moving_joints(
+    data: Any, robot: UrdfDescription, srdf: SrdfDescription | None
+) -> tuple[str, ...]:
+    """Joints that move: given, of the SRDF group, or of the chain base to TCP."""
+    given = at(data, "robot", "joints")
+    if isinstance(given, list):
+        return tuple(name for name in given if name in robot.joints)
+    group = text_at(data, "robot", "group")
+    if group is not None and srdf is not None and group in srdf.groups:
+        names = srdf.groups[group]
+    else:
+        base = text_at(data, "robot", "base_frame") or robot.root
+        tip = text_at(data, "robot", "tcp", "parent") or robot.root
+        names = robot.chain(base, tip)
+    locked = at(data, "robot", "locked_joints_deg")
+    locked = locked if isinstance(locked, dict) else {}
+    return tuple(name for name in names if name not in locked)
+
+
+def _frames(robot: UrdfDescription) -> list[str]:
+    return [*robot.links, *robot.joints]
+
+
+def _check_frames(document: Document, robot: UrdfDescription) -> None:
+    frames = _frames(robot)
+    places: list[tuple[Location, list[str]]] = [
+        (("robot", "tcp", "parent"), frames),
+        (("robot", "base_frame"), frames),
+        (("camera", "parent"), frames),
+    ]
+    for index in range(len(entries(document.data, "bodies"))):
+        places.append((("bodies", index, "attach_to"), [*WORLD, *frames]))
+    for location, known in places:
+        name = text_at(document.data, *location)
+        if name is not None and name not in known:
+            hint = did_you_mean(name, known)
+            document.add(location, f"no frame {name!r} in the URDF; {hint}")
+
+
+def _check_touch(document: Document, robot: UrdfDescription) -> None:
+    bodies = entries(document.data, "bodies")
+    names = [text_at(body, "name") or "" for body in bodies]
+    known = [*robot.links, *(name for name in names if name), "bin"]
+    lists: list[Location] = [("bodies", i, "touch") for i in range(len(bodies))]
+    for location in [*lists, ("bin", "touch")]:
+        for index, name in enumerate(entries(document.data, *location)):
+            if isinstance(name, str) and name not in known:
+                message = f"no link or body {name!r}; {did_you_mean(name, known)}"
+                document.add((*location, index), message)
+
+
+def _check_joints(
+    document: Document, robot: UrdfDescription, moving: tuple[str, ...] | None
+) -> None:
+    every = [name for name, joint in robot.joints.items() if joint.type != "fixed"]
+    data = document.data
+    for index, name in enumerate(entries(data, "robot", "joints")):
+        if not isinstance(name, str):
+            continue
+        if name not in every:
+            hint = did_you_mean(name, every)
+            document.add(
+                ("robot", "joints", index), f"no moving joint {name!r}; {hint}"
+            )
+        elif not robot.joints[name].moves:
+            kind = "mimic" if robot.joints[name].mimics else robot.joints[name].type
+            document.add(
+                ("robot", "joints", index),
+                f"joint {name!r} ({kind}) cannot be planned for",
+            )
+    for location in (
+        ("robot", "locked_joints_deg"),
+        ("robot", "limits", "velocity_rad_s"),
+        ("robot", "limits", "acceleration_rad_s2"),
+        ("robot", "limits", "position_deg"),
+    ):
+        table = at(data, *location)
+        for name in table if isinstance(table, dict) else ():
+            if name not in every:
+                hint = did_you_mean(name, every)
+                document.add((*location, name), f"no moving joint; {hint}", of_key=True)
+    if moving is None:
+        return
+    redundant = text_at(data, "robot", "ik", "redundant_joint")
+    if redundant is not None and redundant not in moving:
+        hint = did_you_mean(redundant, moving)
+        document.add(
+            ("robot", "ik", "redundant_joint"),
+            f"{redundant!r} is not a joint that moves; {hint}",
+        )
+    if not moving and not entries(data, "robot", "joints"):
+        document.add(
+            ("robot", "tcp", "parent"), "no joint moves between the base and the TCP"
+        )
+
+
+def _check_srdf_names(document: Document, srdf: SrdfDescription | None) -> None:
+    for location, kind in (
+        (("robot", "group"), "group"),
+        (("scan_configuration", "group_state"), "group_state"),
+    ):
+        name = text_at(document.data, *location)
+        if name is None:
+            continue
+        if text_at(document.data, "robot", "srdf") is None:
+            document.add(location, f"a {kind} needs robot.srdf")
+        elif srdf is not None:
+            known = list(srdf.groups if kind == "group" else srdf.states)
+            if name not in known:
+                hint = did_you_mean(name, known) or "it has none"
+                document.add(location, f"no {kind} {name!r} in the SRDF; {hint}")
+
+
+def _check_scan_configuration(document: Document, moving: tuple[str, ...]) -> None:
+    for key in ("q_deg", "q_rad"):
+        table = at(document.data, "scan_configuration", key)
+        if not isinstance(table, dict):
+            continue
+        location = ("scan_configuration", key)
+        for name in table:
+            if name not in moving:
+                hint = did_you_mean(name, moving)
+                document.add(
+                    (*location, name), f"not a joint that moves; {hint}", of_key=True
+                )
+        missing = [name for name in moving if name not in table]
+        if missing:
+            document.add(location, f"joints are missing: {', '.join(missing)}")

@@ -1,0 +1,294 @@
+"""YAML text to plain data, remembering the line and column of every value.
+
+Only what a cell file needs is read: mappings with text keys, lists and scalars of
+the YAML 1.2 core schema. Tags, anchors, aliases and merge keys are refused, so that
+no text can grow, recurse or name a Python type. ``ruamel.yaml`` scans and parses;
+the tree is built here from its events, which keeps all marks.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from ruamel.yaml import YAML
+from ruamel.yaml.error import MarkedYAMLError, YAMLError
+from ruamel.yaml.events import (
+    AliasEvent,
+    DocumentStartEvent,
+    Event,
+    MappingEndEvent,
+    MappingStartEvent,
+    ScalarEvent,
+    SequenceEndEvent,
+    SequenceStartEvent,
+)
+
+from reachmap.errors import CellError
+
+MAX_TEXT_BYTES = 256_000
+MAX_DEPTH = 24
+MAX_VALUES = 50_000
+
+Location = tuple[str | int, ...]
+
+_NULL = frozenset({"", "~", "null", "Null", "NULL"})
+_BOOL = {"true": True, "True": True, "TRUE": True} | {
+    "false": False,
+    "False": False,
+    "FALSE": False,
+}
+_INT = re.compile(r"[-+]?[0-9]{1,400}")
+_FLOAT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]{1,9})?")
+_INF = re.compile(r"([-+]?)\.(inf|Inf|INF)")
+_NAN = frozenset({".nan", ".NaN", ".NAN"})
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Place:
+    """Where a value was written: a file and a 1-based line and column.
+
+    ``line`` 0 means that the whole of ``source`` is meant (an override, say).
+    """
+
+    source: str
+    line: int = 0
+    column: int = 0
+
+    def __str__(self) -> str:
+        if self.line:
+            return f"{self.source}:{self.line}:{self.column}"
+        return self.source
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Mistake:
+    """One thing that is wrong, where it is written, and what was expected."""
+
+    place: Place
+    message: str
+    location: Location = ()
+
+    def __str__(self) -> str:
+        path = ".".join(str(part) for part in self.location)
+        return f"{self.place}: {path + ': ' if path else ''}{self.message}"
+
+
+@dataclass(slots=True, kw_only=True)
+class Document:
+    """Data of one YAML text with the place of every value and key.
+
+    Attributes
+    ----------
+    data : object
+        Dicts, lists, text, numbers, booleans and None.
+    places, key_places : dict
+        Location (path of keys and indices) to the place of the value or its key.
+    mistakes : list of Mistake
+        Duplicate keys and other things that do not stop the reading.
+    """
+
+    source: str
+    data: Any = None
+    places: dict[Location, Place] = field(default_factory=dict)
+    key_places: dict[Location, Place] = field(default_factory=dict)
+    mistakes: list[Mistake] = field(default_factory=list)
+
+    def place(self, location: Location, *, of_key: bool = False) -> Place:
+        """Place of a value, or of the nearest enclosing value that was written."""
+        if of_key and location in self.key_places:
+            return self.key_places[location]
+        for length in range(len(location), -1, -1):
+            if location[:length] in self.places:
+                return self.places[location[:length]]
+        return Place(source=self.source)
+
+    def add(self, location: Location, message: str, *, of_key: bool = False) -> None:
+        """Record a mistake at a location."""
+        place = self.place(location, of_key=of_key)
+        self.mistakes.append(Mistake(place=place, location=location, message=message))
+
+    def raise_mistakes(self) -> None:
+        """Raise CellError with every mistake recorded, in the order of the file."""
+        if not self.mistakes:
+            return
+        ordered = sorted(
+            self.mistakes, key=lambda m: (m.place.source, m.place.line, m.place.column)
+        )
+        raise CellError(dict.fromkeys(str(mistake) for mistake in ordered))
+
+
+def read_text(path: Path, *, limit: int, label: str | None = None) -> str:
+    """Read a UTF-8 text file of bounded size; CellError names the file."""
+    label = label or str(path)
+    data = read_bytes(path, limit=limit, label=label)
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
+        raise CellError(
+            f"{label}:{line}:1: expected UTF-8 text (got byte 0x{data[error.start]:02x})"
+        ) from None
+
+
+def read_bytes(path: Path, *, limit: int, label: str | None = None) -> bytes:
+    """Read a regular file of bounded size; CellError names the file."""
+    label = label or str(path)
+    try:
+        if not path.is_file():
+            reason = "is a folder" if path.is_dir() else "no such file"
+            raise CellError(f"{label}: {reason}")
+        with path.open("rb") as stream:
+            data = stream.read(limit + 1)
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise CellError(f"{label}: cannot be read ({reason})") from None
+    if len(data) > limit:
+        raise CellError(f"{label}: larger than the limit of {limit:,} bytes")
+    return data
+
+
+def parse_yaml(text: str, source: str) -> Document:
+    """Parse one YAML document.
+
+    Parameters
+    ----------
+    text : str
+    source : str
+        Name used in error messages.
+
+    Raises
+    ------
+    CellError
+        The text is not YAML, or uses a construct that is refused.
+    """
+    if len(text) > MAX_TEXT_BYTES:
+        raise CellError(f"{source}: larger than the limit of {MAX_TEXT_BYTES:,} bytes")
+    document = Document(source=source)
+    try:
+        _Builder(document).build(YAML(typ="safe", pure=True).parse(text))
+    except MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        place = Place(source=source)
+        if mark is not None:
+            place = Place(source=source, line=mark.line + 1, column=mark.column + 1)
+        problem = error.problem or error.context or "cannot be parsed"
+        raise CellError(f"{place}: not valid YAML: {problem}") from None
+    except (YAMLError, ValueError, IndexError, AssertionError, TypeError) as error:
+        # ruamel's scanner raises bare builtin errors on some malformed texts
+        # (a directive cut short, an impossible code point).
+        first = str(error).strip().splitlines()
+        reason = first[0] if first else type(error).__name__
+        raise CellError(f"{source}: not valid YAML: {reason}") from None
+    return document
+
+
+def scalar_value(text: str) -> str | int | float | bool | None:
+    """Value of an unquoted scalar in the YAML 1.2 core schema.
+
+    Examples
+    --------
+    >>> scalar_value("1e-3"), scalar_value("no"), scalar_value("012")
+    (0.001, 'no', 12)
+    """
+    if text in _NULL:
+        return None
+    if text in _BOOL:
+        return _BOOL[text]
+    if _INT.fullmatch(text):
+        return int(text)
+    if _FLOAT.fullmatch(text):
+        return float(text)
+    if match := _INF.fullmatch(text):
+        return -math.inf if match[1] == "-" else math.inf
+    return math.nan if text in _NAN else text
+
+
+class _Builder:
+    """Builds nested data from a stream of parser events."""
+
+    def __init__(self, document: Document) -> None:
+        self._document = document
+        self._count = 0
+
+    def build(self, events: Iterator[Event]) -> None:
+        """Fill the document from all events of the stream."""
+        documents = 0
+        for event in events:
+            if isinstance(event, DocumentStartEvent):
+                documents += 1
+                if documents > 1:
+                    self._refuse(event, "only one YAML document is allowed in a file")
+                self._document.data = self._value(next(events), (), events, 0)
+        if not documents:
+            raise CellError(f"{self._document.source}: the file is empty")
+
+    def _value(
+        self, event: Event, location: Location, events: Iterator[Event], depth: int
+    ) -> Any:
+        self._check(event, depth)
+        self._document.places[location] = self._place(event)
+        if isinstance(event, ScalarEvent):
+            plain = event.implicit[0] and event.style is None
+            return scalar_value(event.value) if plain else event.value
+        if isinstance(event, SequenceStartEvent):
+            return self._sequence(location, events, depth + 1)
+        return self._mapping(location, events, depth + 1)
+
+    def _sequence(
+        self, location: Location, events: Iterator[Event], depth: int
+    ) -> list[Any]:
+        items: list[Any] = []
+        while not isinstance(event := next(events), SequenceEndEvent):
+            items.append(self._value(event, (*location, len(items)), events, depth))
+        return items
+
+    def _mapping(
+        self, location: Location, events: Iterator[Event], depth: int
+    ) -> dict[str, Any]:
+        items: dict[str, Any] = {}
+        while not isinstance(event := next(events), MappingEndEvent):
+            self._check(event, depth)
+            if not isinstance(event, ScalarEvent):
+                self._refuse(event, "keys must be plain text")
+            key = str(event.value)
+            if key == "<<":
+                self._refuse(event, "merge keys (<<) are not supported")
+            inner = (*location, key)
+            if key in items:
+                place = self._place(event)
+                message = (
+                    f"key given twice (first at {self._document.key_places[inner]})"
+                )
+                self._document.mistakes.append(
+                    Mistake(place=place, location=inner, message=message)
+                )
+                _Builder(Document(source=""))._value(next(events), (), events, depth)
+                continue
+            self._document.key_places[inner] = self._place(event)
+            items[key] = self._value(next(events), inner, events, depth)
+        return items
+
+    def _check(self, event: Event, depth: int) -> None:
+        self._count += 1
+        if self._count > MAX_VALUES:
+            self._refuse(event, f"more than {MAX_VALUES:,} values")
+        if depth > MAX_DEPTH:
+            self._refuse(event, f"nested more than {MAX_DEPTH} levels deep")
+        if isinstance(event, AliasEvent) or getattr(event, "anchor", None):
+            self._refuse(event, "anchors and aliases are not supported")
+        if getattr(event, "tag", None):
+            self._refuse(event, f"tags are not supported (got {str(event.tag)[:60]})")
+
+    def _place(self, event: Event) -> Place:
+        mark = event.start_mark
+        return Place(
+            source=self._document.source, line=mark.line + 1, column=mark.column + 1
+        )
+
+    def _refuse(self, event: Event, message: str) -> None:
+        raise CellError(f"{self._place(event)}: {message}")
