@@ -70,7 +70,11 @@ def bin_boxes(spec: BinSpec) -> tuple[BinBox, ...]:
     outer_x, outer_y = x + 2 * wall, y + 2 * wall
     height, middle = depth + bottom, (depth - bottom) / 2
     walls = [
-        (f"bin wall {sign}x", (wall, outer_y, height), (s * (x + wall) / 2, 0.0, middle))
+        (
+            f"bin wall {sign}x",
+            (wall, outer_y, height),
+            (s * (x + wall) / 2, 0.0, middle),
+        )
         for sign, s in (("+", 1), ("-", -1))
     ] + [
         (f"bin wall {sign}y", (x, wall, height), (0.0, s * (y + wall) / 2, middle))
@@ -191,8 +195,10 @@ class _Builder:
         """Add one body and pair it with everything on other joints."""
         placement = pin.SE3(np.ascontiguousarray(T_joint_body))
         # Parent frame 0: an SRDF must not reach bodies that stand on the base link.
-        frame = 0 if joint == ROOT else self.robot.model.getFrameId(
-            self.robot.model.names[joint]
+        frame = (
+            0
+            if joint == ROOT
+            else self.robot.model.getFrameId(self.robot.model.names[joint])
         )
         index = self.geometry.addGeometryObject(
             pin.GeometryObject(name, joint, frame, placement, shape)
@@ -226,9 +232,7 @@ class _Builder:
             if frozenset((self.names[pair.first], self.names[pair.second])) in allowed:
                 self.geometry.removeCollisionPair(pair)
 
-    def _expand(
-        self, a: str, b: str, *, with_bin: bool
-    ) -> Iterable[tuple[str, str]]:
+    def _expand(self, a: str, b: str, *, with_bin: bool) -> Iterable[tuple[str, str]]:
         boxes = [n for n in self.names if with_bin and n.startswith("bin ")]
         for first in boxes if a == "bin" else [a]:
             for second in boxes if b == "bin" else [b]:

@@ -86,7 +86,12 @@ class CollisionChecker:
             self._geometry, np.full(len(self._pair_names), self.safety_margin_m)
         )
         self._ladder = [
-            (step, *self._broadphase_with(self._hulls, self.safety_margin_m + step * self._shares))
+            (
+                step,
+                *self._broadphase_with(
+                    self._hulls, self.safety_margin_m + step * self._shares
+                ),
+            )
             for step in LADDER_M
         ]
 
@@ -130,9 +135,7 @@ class CollisionChecker:
     def touching_pairs(self, q: FloatArray) -> tuple[int, ...]:
         """Indices into ``body_pairs`` of all pairs that touch at q."""
         data = self._base
-        pin.computeCollisions(
-            self._model, self._data, self._geometry, data, q, False
-        )
+        pin.computeCollisions(self._model, self._data, self._geometry, data, q, False)
         hits = [
             int(self._pair_index[index])
             for index, result in enumerate(data.collisionResults)

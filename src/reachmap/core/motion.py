@@ -82,9 +82,7 @@ class MotionChecker:
 
     def path_is_verified(self, path: FloatArray) -> bool:
         """:meth:`is_verified` of every segment, shape (n, dof)."""
-        return all(
-            self.is_verified(path[k], path[k + 1]) for k in range(len(path) - 1)
-        )
+        return all(self.is_verified(path[k], path[k + 1]) for k in range(len(path) - 1))
 
     def blocking_pair(self, path: FloatArray) -> int:
         """Pair that touches first along a path, or -1 (for explanations)."""

@@ -1,0 +1,300 @@
+"""Plans with OMPL from a configuration to any of a set of goals.
+
+A plan is found at the planning step, shortened, and counts only when it passes the
+verification distance; otherwise the attempt goes on with what is left of its budget.
+Budgets are state checks, so the same seed gives the same path on any machine; the
+limit in seconds is a safety net that is recorded when it strikes.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from ompl import base as ob
+from ompl import geometric as og
+from ompl import util as ou
+
+from reachmap._typing import FloatArray
+from reachmap.cell.planner import PlannerSpec
+from reachmap.core.motion import MotionChecker
+from reachmap.core.simplification import shorten
+from reachmap.errors import EngineError
+
+ou.setLogLevel(ou.LogLevel.LOG_NONE)
+
+_CLOCK_EVERY = 64
+_OPTIMISING = frozenset(
+    {"RRTstar", "PRMstar", "BITstar", "InformedRRTstar", "SORRTstar", "AORRTC"}
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlanResult:
+    """One attempt.
+
+    Attributes
+    ----------
+    path : array, shape (n, dof), or None
+        Verified, from the start to a goal [rad].
+    goal : int
+        Row of the goal reached, -1 without a path.
+    checks : int
+        State checks spent on searching.
+    planning_time_s, planning_cpu_time_s : float
+        Of the search alone, wall and thread CPU.
+    simplification_time_s : float
+        Thread CPU of shortening and verification.
+    hit_time_limit : bool
+        Whether the safety net in seconds ended the attempt.
+    unverified : int
+        Paths that were found and did not pass the verification distance.
+    """
+
+    path: FloatArray | None
+    goal: int
+    checks: int
+    planning_time_s: float
+    planning_cpu_time_s: float
+    simplification_time_s: float
+    hit_time_limit: bool
+    unverified: int
+
+
+class Planner:
+    """A planner of the cell's kind, made anew for each attempt.
+
+    Parameters
+    ----------
+    motions : MotionChecker
+    lower_rad, upper_rad : array, shape (dof,)
+    spec : PlannerSpec
+    """
+
+    def __init__(
+        self,
+        motions: MotionChecker,
+        lower_rad: FloatArray,
+        upper_rad: FloatArray,
+        spec: PlannerSpec,
+    ) -> None:
+        self.motions = motions
+        self.spec = spec
+        self._lower, self._upper = lower_rad, upper_rad
+
+    def plan(
+        self,
+        start: FloatArray,
+        goals: FloatArray,
+        seed: int,
+        *,
+        max_checks: int | None = None,
+    ) -> PlanResult:
+        """Make one attempt.
+
+        Parameters
+        ----------
+        start : array, shape (dof,)
+            Free configuration.
+        goals : array, shape (m, dof)
+            Free configurations, any of which will do.
+        seed : int
+            Of this attempt; the result depends on nothing else.
+        max_checks : int, optional
+            Budget in state checks; default: the cell's.
+        """
+        budget = _Budget(
+            self.motions,
+            max_checks or self.spec.max_checks,
+            self.spec.time_limit_s,
+        )
+        seeds = np.random.SeedSequence(seed)
+        wall = cpu = shortening = 0.0
+        unverified = 0
+        path = None
+        while len(goals) and path is None and not budget.spent():
+            wall_0, cpu_0 = time.perf_counter(), time.thread_time()
+            search = self._search(start, goals, seeds.spawn(1)[0], budget)
+            wall += time.perf_counter() - wall_0
+            cpu += time.thread_time() - cpu_0
+            if search is None:
+                break
+            cpu_0 = time.thread_time()
+            with budget.paused():
+                path = self._shorten_and_verify(search, seed)
+            shortening += time.thread_time() - cpu_0
+            unverified += path is None
+        return PlanResult(
+            path=path,
+            goal=-1 if path is None else _nearest_row(goals, path[-1]),
+            checks=budget.used(),
+            planning_time_s=wall,
+            planning_cpu_time_s=cpu,
+            simplification_time_s=shortening,
+            hit_time_limit=budget.out_of_time,
+            unverified=unverified,
+        )
+
+    def _search(
+        self,
+        start: FloatArray,
+        goals: FloatArray,
+        seed: np.random.SeedSequence,
+        budget: _Budget,
+    ) -> _Search | None:
+        """One run of the OMPL planner, or None without an exact solution."""
+        # The seed is global in OMPL, and acts on what is built after it.
+        ou.RNG.setSeed(int(seed.generate_state(1)[0]) or 1)
+        space = self._space()
+        information = ob.SpaceInformation(space)
+        checker, dof = self.motions.checker, range(len(start))
+        information.setStateValidityChecker(
+            lambda state: checker.is_free(np.array([state[i] for i in dof]))
+        )
+        information.setMotionValidator(_MotionValidator(information, self.motions))
+        information.setup()
+        problem = ob.ProblemDefinition(information)
+        problem.addStartState(_state(information, start))
+        goal = ob.GoalStates(information)
+        for q in goals:
+            goal.addState(_state(information, q))
+        problem.setGoal(goal)
+        if self.spec.name in _OPTIMISING:
+            problem.setOptimizationObjective(
+                ob.PathLengthOptimizationObjective(information)
+            )
+        planner = self._planner(information)
+        planner.setProblemDefinition(problem)
+        planner.setup()
+        planner.solve(ob.PlannerTerminationCondition(budget.spent))
+        if not problem.hasExactSolution():
+            return None
+        return _Search(information, problem.getSolutionPath(), len(start))
+
+    def _space(self) -> Any:
+        space = ob.RealVectorStateSpace(len(self._lower))
+        bounds = ob.RealVectorBounds(len(self._lower))
+        for index, (low, high) in enumerate(zip(self._lower, self._upper, strict=True)):
+            bounds.setLow(index, float(low))
+            bounds.setHigh(index, float(high))
+        space.setBounds(bounds)
+        return space
+
+    def _planner(self, information: Any) -> Any:
+        try:
+            planner = getattr(og, self.spec.name)(information)
+        except AttributeError as error:
+            raise EngineError(f"OMPL has no planner {self.spec.name}") from error
+        if self.spec.range_rad is not None and hasattr(planner, "setRange"):
+            planner.setRange(self.spec.range_rad)
+        if self.spec.goal_bias is not None and hasattr(planner, "setGoalBias"):
+            planner.setGoalBias(self.spec.goal_bias)
+        return planner
+
+    def _shorten_and_verify(self, search: _Search, seed: int) -> FloatArray | None:
+        """Shorten at the planning step; where that fails to verify, more carefully."""
+        motions, settings = self.motions, self.spec.simplification
+        raw = search.waypoints()
+        if settings.method == "none":
+            return raw if motions.path_is_verified(raw) else None
+        if settings.method == "simplify_max":
+            short = search.simplified()
+            return short if motions.path_is_verified(short) else None
+        for is_free in (motions.is_free, motions.is_verified):
+            rng = np.random.default_rng(seed)
+            short = shorten(raw, is_free, tries=settings.tries, rng=rng)
+            if motions.path_is_verified(short):
+                return short
+        return None
+
+
+class _Search:
+    """A path as OMPL found it, with the space it lives in."""
+
+    def __init__(self, information: Any, path: Any, dof: int) -> None:
+        self._information, self._path, self._dof = information, path, dof
+
+    def waypoints(self) -> FloatArray:
+        """Way-points, shape (n, dof)."""
+        states = (
+            self._path.getState(row) for row in range(self._path.getStateCount())
+        )
+        return np.array([[state[i] for i in range(self._dof)] for state in states])
+
+    def simplified(self) -> FloatArray:
+        """Way-points after OMPL's own ``simplifyMax``."""
+        og.PathSimplifier(self._information).simplifyMax(self._path)
+        return self.waypoints()
+
+
+class _MotionValidator(ob.MotionValidator):  # type: ignore[misc]
+    """Our definition of a free motion, given to OMPL."""
+
+    def __init__(self, information: Any, motions: MotionChecker) -> None:
+        super().__init__(information)
+        self._is_free = motions.is_free
+        self._dof = range(information.getStateDimension())
+
+    def checkMotion(self, first: Any, second: Any, *_: Any) -> bool:  # noqa: N802
+        return self._is_free(
+            np.array([first[i] for i in self._dof]),
+            np.array([second[i] for i in self._dof]),
+        )
+
+
+class _Budget:
+    """State checks left for searching; shortening does not count."""
+
+    def __init__(self, motions: MotionChecker, checks: int, seconds: float) -> None:
+        self._checker = motions.checker
+        self._limit = self._checker.checks + checks
+        self._begin = self._checker.checks
+        self._deadline = time.monotonic() + seconds
+        self._calls = 0
+        self.out_of_time = False
+
+    def used(self) -> int:
+        """State checks spent on searching."""
+        return self._checker.checks - self._begin
+
+    def spent(self) -> bool:
+        """Whether the checks, or the seconds of the safety net, are used up."""
+        if self._checker.checks >= self._limit:
+            return True
+        self._calls += 1
+        if self._calls % _CLOCK_EVERY == 0 and time.monotonic() > self._deadline:
+            self.out_of_time = True
+        return self.out_of_time
+
+    def paused(self) -> _Pause:
+        """Context in which checks are not counted."""
+        return _Pause(self)
+
+    def give_back(self, checks: int) -> None:
+        """Move the limits by checks that do not count."""
+        self._limit += checks
+        self._begin += checks
+
+
+class _Pause:
+    def __init__(self, budget: _Budget) -> None:
+        self._budget = budget
+
+    def __enter__(self) -> None:
+        self._used = self._budget.used()
+
+    def __exit__(self, *_: object) -> None:
+        self._budget.give_back(self._budget.used() - self._used)
+
+
+def _state(information: Any, q: FloatArray) -> Any:
+    state = information.allocState()
+    for index, value in enumerate(q):
+        state[index] = float(value)
+    return state
+
+
+def _nearest_row(goals: FloatArray, q: FloatArray) -> int:
+    return int(np.argmin(np.abs(goals - q).max(axis=1)))

@@ -1,0 +1,112 @@
+"""A cell made ready for planning: arm, bodies, checks, scan configuration."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from reachmap._typing import FloatArray
+from reachmap.core.bodies import build_geometry
+from reachmap.core.collision import CollisionChecker
+from reachmap.core.kinematics import Kinematics
+from reachmap.core.motion import MotionChecker
+from reachmap.core.planning import Planner
+from reachmap.core.robot import RobotModel
+from reachmap.errors import SceneError
+
+if TYPE_CHECKING:
+    from reachmap.cell.loading import LoadedCell
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Scene:
+    """Everything that answers questions about one cell.
+
+    Attributes
+    ----------
+    loaded : LoadedCell
+    robot : RobotModel
+    kinematics : Kinematics
+    checker : CollisionChecker
+    motions : MotionChecker
+    planner : Planner
+    scan_configuration : array, shape (dof,)
+        [rad].
+    T_base_bin : array, shape (4, 4)
+    with_bin : bool
+        Whether the bin is among the obstacles.
+    """
+
+    loaded: LoadedCell = field(repr=False)
+    robot: RobotModel
+    kinematics: Kinematics
+    checker: CollisionChecker
+    motions: MotionChecker
+    planner: Planner
+    scan_configuration: FloatArray
+    T_base_bin: FloatArray
+    with_bin: bool
+
+    @classmethod
+    def build(cls, loaded: LoadedCell, *, with_bin: bool = True) -> Scene:
+        """Assemble a scene.
+
+        Raises
+        ------
+        SceneError
+            A frame, joint or body name is unknown, or a mesh cannot be used.
+        """
+        cell = loaded.cell
+        robot = RobotModel.from_cell(loaded)
+        bodies = build_geometry(robot, loaded, with_bin=with_bin)
+        checker = CollisionChecker(robot, bodies, cell.collision.safety_margin_m)
+        motions = MotionChecker(
+            checker,
+            cell.collision.planning_step_rad,
+            cell.collision.verification_distance_m,
+        )
+        return cls(
+            loaded=loaded,
+            robot=robot,
+            kinematics=Kinematics.from_cell(robot, loaded.cell.robot.ik),
+            checker=checker,
+            motions=motions,
+            planner=Planner(motions, robot.lower_rad, robot.upper_rad, cell.planner),
+            scan_configuration=robot.configuration(
+                loaded.scan_configuration_rad, "scan_configuration"
+            ),
+            T_base_bin=cell.bin.pose.matrix(),
+            with_bin=with_bin,
+        )
+
+    def require_free_scan_configuration(self) -> None:
+        """Refuse to work from a scan configuration that cannot be taken.
+
+        Raises
+        ------
+        SceneError
+            It is outside joint limits, or two bodies touch; they are named.
+        """
+        source = self.loaded.source
+        problems = [
+            f"{source}: scan_configuration: {name} is outside its limits"
+            for name in self.robot.outside_limits(self.scan_configuration)
+        ]
+        pairs = self.checker.touching_pairs(self.scan_configuration)
+        problems += [
+            f"{source}: scan_configuration: {a} touches {b}"
+            for a, b in (self.checker.body_pairs[k].split(" | ") for k in pairs)
+        ]
+        if problems:
+            raise SceneError(problems)
+
+    def tcp_path_points(self, path: FloatArray, step_rad: float = 0.02) -> FloatArray:
+        """TCP positions along a joint path, shape (n, 3) [m]."""
+        pieces = [path[:1]]
+        for q_from, q_to in zip(path[:-1], path[1:], strict=True):
+            steps = max(1, int(np.ceil(np.linalg.norm(q_to - q_from) / step_rad)))
+            shares = np.arange(1, steps + 1)[:, None] / steps
+            pieces.append(q_from + shares * (q_to - q_from))
+        return self.kinematics.forward_many(np.vstack(pieces))[:, :3, 3]
