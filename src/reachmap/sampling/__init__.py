@@ -1,1 +1,5 @@
-"""Where to look: lattices of points, families of tool orientations."""
+"""Where a scan looks: lattices of points, families of orientations, test frames.
+
+Import from the modules: ``lattice`` needs NumPy only, the others the cell
+description.
+"""

@@ -1,0 +1,149 @@
+"""Test frames: the tool poses that a scan tries to reach."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from reachmap._typing import FloatArray, IntArray
+from reachmap.cell.model import BinScanSpec, BinSpec, WorkspaceScanSpec
+from reachmap.geometry import quaternion_wxyz_from_rotation, transform_from_parts
+from reachmap.sampling.lattice import Lattice, cube_lattice
+from reachmap.sampling.orientations import orientation_set
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FrameGrid:
+    """Points times orientations, in robot_base.
+
+    The poses are the product of the two arrays; they are built for the frames that
+    are asked for, since ten million matrices would not fit beside the work on them.
+
+    Attributes
+    ----------
+    points : array, shape (..., 3)
+        Index order (z, y, x) or (layer, y, x) [m].
+    orientations : array, shape (no, 3, 3)
+        R_base_tcp.
+    """
+
+    points: FloatArray
+    orientations: FloatArray
+
+    def __post_init__(self) -> None:
+        self.points.setflags(write=False)
+        self.orientations.setflags(write=False)
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Shape of the array of frames: the points', then the orientations."""
+        return (*self.points.shape[:-1], len(self.orientations))
+
+    @property
+    def size(self) -> int:
+        """Number of frames."""
+        return int(np.prod(self.shape))
+
+    @property
+    def quaternion_wxyz(self) -> FloatArray:
+        """The orientations as unit quaternions, shape (no, 4)."""
+        return quaternion_wxyz_from_rotation(self.orientations)
+
+    def transforms(self) -> FloatArray:
+        """T_base_tcp of every frame, shape (..., no, 4, 4)."""
+        return transform_from_parts(self.orientations, self.points[..., None, :])
+
+    def transforms_at(self, flat: IntArray | slice) -> FloatArray:
+        """T_base_tcp of some frames by flat index (orientation fastest), (n, 4, 4)."""
+        chosen = np.arange(self.size)[flat] if isinstance(flat, slice) else flat
+        point, orientation = np.divmod(chosen, len(self.orientations))
+        return transform_from_parts(
+            self.orientations[orientation], self.points.reshape(-1, 3)[point]
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CubeFrames:
+    """A cube of the workspace scan and its test frames."""
+
+    name: str
+    lattice: Lattice
+    frames: FrameGrid
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BinFrames:
+    """The grid inside a bin and its test frames.
+
+    Attributes
+    ----------
+    layer, y, x : array, shape (nl,), (ny,), (nx,)
+        Grid coordinates in the bin frame: origin at the centre of the inner bottom,
+        x along the inner x side, z up [m].
+    frames : FrameGrid
+        In robot_base, shape (nl, ny, nx, no).
+    """
+
+    layer: FloatArray
+    y: FloatArray
+    x: FloatArray
+    frames: FrameGrid
+
+    @property
+    def T_base_tcp(self) -> FloatArray:  # noqa: N802
+        """Every test frame, shape (nl, ny, nx, no, 4, 4)."""
+        return self.frames.transforms()
+
+
+def workspace_frames(
+    spec: WorkspaceScanSpec, approach_axis: str
+) -> tuple[CubeFrames, ...]:
+    """Test frames of each cube; orientations are given in robot_base."""
+    R = orientation_set(spec.orientations, approach_axis)
+    cubes = []
+    for cube in spec.cubes:
+        lattice = cube_lattice(cube, spec.z_step)
+        frames = FrameGrid(points=lattice.points(), orientations=R)
+        cubes.append(CubeFrames(name=cube.name, lattice=lattice, frames=frames))
+    return tuple(cubes)
+
+
+def bin_test_frames(
+    spec: BinScanSpec, bin_spec: BinSpec, approach_axis: str, T_base_bin: FloatArray
+) -> BinFrames:
+    """Test frames inside a bin; orientations turn with the bin.
+
+    Parameters
+    ----------
+    spec : BinScanSpec
+        Grid (points along the bin's x and y), layers, orientations.
+    bin_spec : BinSpec
+        Inner size; its own pose is not used.
+    approach_axis : str
+        TCP axis into the object, as in ``"+z"``.
+    T_base_bin : array, shape (4, 4)
+        Pose of the bin frame in robot_base.
+    """
+    x = cell_centres(bin_spec.inner[0], spec.grid[0])
+    y = cell_centres(bin_spec.inner[1], spec.grid[1])
+    layer = np.array(spec.layers, float)
+    p_bin = Lattice(x=x, y=y, z=layer).points()
+    R_bin = orientation_set(spec.orientations, approach_axis)
+    frames = FrameGrid(
+        points=p_bin @ T_base_bin[:3, :3].T + T_base_bin[:3, 3],
+        orientations=T_base_bin[:3, :3] @ R_bin,
+    )
+    return BinFrames(layer=layer, y=y, x=x, frames=frames)
+
+
+def cell_centres(side: float, count: int) -> FloatArray:
+    """Centres of ``count`` equal cells along a side centred on 0 [m].
+
+    Examples
+    --------
+    >>> cell_centres(0.3, 3).tolist()
+    [-0.1, 0.0, 0.1]
+    """
+    centres = (np.arange(count) - (count - 1) / 2.0) * (side / count)
+    return np.round(centres, 12) + 0.0

@@ -1,0 +1,80 @@
+"""Families of tool orientations as rotation matrices.
+
+The reference frame has z up: robot_base for the workspace, the bin frame for the bin.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from reachmap._typing import FloatArray
+from reachmap.cell.orientations import ConeFamily, ListFamily
+from reachmap.geometry import AXES, rotation_from_rpy_deg
+
+
+def orientation_set(
+    family: ConeFamily | ListFamily, approach_axis: str = "+z"
+) -> FloatArray:
+    """Every TCP orientation of a family, in the family's own order.
+
+    Cones run ring → azimuth → roll, the last fastest.
+
+    Parameters
+    ----------
+    family : ConeFamily or ListFamily
+    approach_axis : {"+x", "-x", "+y", "-y", "+z", "-z"}
+        Axis of the TCP that points into the object. A list ignores it: its
+        orientations are those of the TCP itself.
+
+    Returns
+    -------
+    array, shape (m, 3, 3)
+        R_reference_tcp.
+    """
+    if isinstance(family, ListFamily):
+        return rotation_from_rpy_deg(np.array(family.rpy_deg))
+    upright = straight_down_orientation(approach_axis)
+    rolls_deg = family.roll_offset_deg + (
+        np.arange(family.rolls) * family.roll_span_deg / family.rolls
+    )
+    blocks = []
+    for tilt_deg, count in zip(family.tilts_deg, family.azimuths, strict=True):
+        for azimuth_deg in family.azimuth_offset_deg + np.arange(count) * 360.0 / count:
+            tilt = _tilt_rotation(tilt_deg, azimuth_deg)
+            approach = -tilt[:, 2]
+            roll = Rotation.from_rotvec(np.outer(np.radians(rolls_deg), approach))
+            blocks.append(roll.as_matrix() @ (tilt @ upright))
+    return np.concatenate(blocks)
+
+
+def straight_down_orientation(approach_axis: str) -> FloatArray:
+    """R_reference_tcp of a tool that points straight down, shape (3, 3).
+
+    The approach axis lies along reference -z, and the next axis of the TCP in cyclic
+    order (x → y → z → x) along reference +x.
+    """
+    axis, sign = AXES[approach_axis]
+    R = np.zeros((3, 3))
+    R[2, axis] = -sign
+    R[0, (axis + 1) % 3] = 1.0
+    # The third column completes a right-handed frame.
+    R[:, (axis + 2) % 3] = np.cross(R[:, axis], R[:, (axis + 1) % 3])
+    return R + 0.0
+
+
+def approach_directions(R: FloatArray, approach_axis: str) -> FloatArray:
+    """Where the tool points: (..., 3, 3) orientations to (..., 3) unit vectors."""
+    axis, sign = AXES[approach_axis]
+    return np.asarray(sign * R[..., :, axis])
+
+
+def _tilt_rotation(tilt_deg: float, azimuth_deg: float) -> FloatArray:
+    """Least rotation that takes straight down to the tilted direction, (3, 3).
+
+    The direction is (sin t cos φ, sin t sin φ, -cos t), so the axis is horizontal and
+    square to the azimuth.
+    """
+    azimuth = np.radians(azimuth_deg)
+    axis = np.array([np.sin(azimuth), -np.cos(azimuth), 0.0])
+    return np.asarray(Rotation.from_rotvec(np.radians(tilt_deg) * axis).as_matrix())
