@@ -5,7 +5,15 @@ from __future__ import annotations
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Discriminator,
+    Field,
+    Tag,
+    model_validator,
+)
 
 from reachmap._typing import FloatArray
 from reachmap.geometry import (
@@ -14,30 +22,74 @@ from reachmap.geometry import (
     transform_from_parts,
 )
 
+MAX_LENGTH_M = 100.0
+MAX_ANGLE_DEG = 3600.0
+
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
-Vector3 = tuple[Finite, Finite, Finite]
-Size3 = tuple[Positive, Positive, Positive]
-Interval = tuple[Finite, Finite]
+Coordinate = Annotated[
+    float, Field(ge=-MAX_LENGTH_M, le=MAX_LENGTH_M, allow_inf_nan=False)
+]
+Length = Annotated[float, Field(gt=0, le=MAX_LENGTH_M, allow_inf_nan=False)]
+Angle = Annotated[
+    float, Field(ge=-MAX_ANGLE_DEG, le=MAX_ANGLE_DEG, allow_inf_nan=False)
+]
+Unit = Annotated[float, Field(ge=-1.01, le=1.01, allow_inf_nan=False)]
+Vector3 = tuple[Coordinate, Coordinate, Coordinate]
+Angles3 = tuple[Angle, Angle, Angle]
+Size3 = tuple[Length, Length, Length]
 SignedAxis = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
 Identifier = Annotated[str, Field(min_length=1, max_length=80, pattern=r"^[\w.\- ]+$")]
+Name = Annotated[str, Field(min_length=1, max_length=200)]
+Reference = Annotated[str, Field(min_length=1, max_length=4000)]
+
+
+def _rising(interval: tuple[float, float]) -> tuple[float, float]:
+    if interval[0] >= interval[1]:
+        raise ValueError(f"expected [low, high] with low < high (got {list(interval)})")
+    return interval
+
+
+def _not_falling(interval: tuple[float, float]) -> tuple[float, float]:
+    if interval[0] > interval[1]:
+        raise ValueError(
+            f"expected [low, high] with low <= high (got {list(interval)})"
+        )
+    return interval
+
+
+Interval = Annotated[tuple[Finite, Finite], AfterValidator(_rising)]
+LengthRange = Annotated[tuple[Coordinate, Coordinate], AfterValidator(_not_falling)]
+AngleRange = Annotated[tuple[Angle, Angle], AfterValidator(_not_falling)]
+
+
+def _rate_kind(value: Any) -> str:
+    return "per joint" if isinstance(value, dict) else "all joints"
+
+
+# Callable discriminators, not plain unions: a mistake then gives one message.
+Rates = Annotated[
+    Annotated[Positive, Tag("all joints")]
+    | Annotated[dict[str, Positive], Tag("per joint")],
+    Discriminator(_rate_kind),
+]
 
 
 class Record(BaseModel):
     """A frozen description; unknown keys are mistakes."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=False)
+    model_config = ConfigDict(extra="forbid", frozen=True)
 
 
 class PoseSpec(Record):
     """A pose: metres, and exactly one of ``rpy_deg`` and ``quaternion_wxyz``."""
 
     xyz: Vector3 = Field((0.0, 0.0, 0.0), description="Translation [m].")
-    rpy_deg: Vector3 | None = Field(
+    rpy_deg: Angles3 | None = Field(
         None, description="Roll, pitch, yaw [deg] about fixed x, y, z."
     )
-    quaternion_wxyz: tuple[Finite, Finite, Finite, Finite] | None = Field(
+    quaternion_wxyz: tuple[Unit, Unit, Unit, Unit] | None = Field(
         None, description="Unit quaternion, scalar first."
     )
 
@@ -63,8 +115,8 @@ class PoseSpec(Record):
 class CylinderShape(Record):
     """A cylinder about z, centred."""
 
-    radius: Positive = Field(description="Radius [m].")
-    length: Positive = Field(description="Full length along z [m].")
+    radius: Length = Field(description="Radius [m].")
+    length: Length = Field(description="Full length along z [m].")
 
 
 class CapsuleShape(CylinderShape):
@@ -74,26 +126,37 @@ class CapsuleShape(CylinderShape):
 class SphereShape(Record):
     """A sphere, centred."""
 
-    radius: Positive = Field(description="Radius [m].")
+    radius: Length = Field(description="Radius [m].")
+
+
+def _scale_kind(value: Any) -> str:
+    return "per axis" if isinstance(value, list | tuple) else "uniform"
+
+
+Scale = Annotated[
+    Annotated[Positive, Tag("uniform")]
+    | Annotated[tuple[Positive, Positive, Positive], Tag("per axis")],
+    Discriminator(_scale_kind),
+]
 
 
 class MeshShape(Record):
     """A triangle mesh: STL, OBJ, DAE or PLY."""
 
-    file: str = Field(
-        min_length=1, description="package://, absolute or relative path."
+    file: Reference = Field(
+        description="Mesh file: package://, absolute, or relative to the cell."
     )
-    scale: Positive | Size3 = Field(1.0, description="Factor to metres.")
+    scale: Scale = Field(1.0, description="Factor to metres, one or per axis.")
 
 
 class Shape(Record):
     """Exactly one of ``box``, ``cylinder``, ``capsule``, ``sphere``, ``mesh``."""
 
     box: Size3 | None = Field(None, description="Full sides x, y, z [m].")
-    cylinder: CylinderShape | None = None
-    capsule: CapsuleShape | None = None
-    sphere: SphereShape | None = None
-    mesh: MeshShape | None = None
+    cylinder: CylinderShape | None = Field(None, description="Cylinder about z.")
+    capsule: CapsuleShape | None = Field(None, description="Capsule about z.")
+    sphere: SphereShape | None = Field(None, description="Sphere.")
+    mesh: MeshShape | None = Field(None, description="Triangle mesh from a file.")
 
     @model_validator(mode="after")
     def _exactly_one(self) -> Shape:

@@ -7,7 +7,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from reachmap._typing import FloatArray
 from reachmap.cell.joint_limits import MoveItLimits, parse_joint_limits
+from reachmap.cell.meshes import MeshError, mesh_size
 from reachmap.cell.references import at, entries, text_at
 from reachmap.cell.resources import NotFoundError, Resolver
 from reachmap.cell.srdf import SrdfDescription, parse_srdf
@@ -39,12 +41,17 @@ class CellFiles:
     joint_limits: dict[str, MoveItLimits] = field(default_factory=dict)
     mesh_paths: dict[str, Path] = field(default_factory=dict)
     files_sha256: dict[str, str] = field(default_factory=dict)
+    mesh_sizes: dict[str, FloatArray] = field(default_factory=dict)
 
     def add_mesh(self, key: str, path: Path) -> None:
-        """Record a mesh by its key, with the sha256 of its bytes."""
+        """Record a mesh by its key, with its size and the sha256 of its bytes."""
         data = read_bytes(path, limit=MAX_MESH_BYTES)
         self.mesh_paths[key] = path
         self.files_sha256[key] = hashlib.sha256(data).hexdigest()
+        try:
+            self.mesh_sizes[key] = mesh_size(data, path.suffix)
+        except MeshError as error:
+            raise CellError(f"mesh {path}: {error}") from None
 
 
 def read_files(document: Document, directory: Path) -> CellFiles:

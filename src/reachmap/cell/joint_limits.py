@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -53,9 +52,9 @@ def _one(document: Document, name: str, entry: Any) -> MoveItLimits:
     def number(flag: str, key: str, *, positive: bool) -> float | None:
         if entry.get(flag) is not True:
             return None
-        value = entry.get(key)
+        value: Any = entry.get(key)
         fine = isinstance(value, int | float) and not isinstance(value, bool)
-        if not fine or not math.isfinite(value) or (positive and value <= 0):
+        if not fine or not abs(value) < 1e6 or (positive and value <= 0):
             wanted = "a positive finite number" if positive else "a finite number"
             document.add((*location, key), f"expected {wanted} (got {value!r:.60})")
             return None
@@ -69,7 +68,7 @@ def _one(document: Document, name: str, entry: Any) -> MoveItLimits:
         lower=number("has_position_limits", "min_position", positive=False),
         upper=number("has_position_limits", "max_position", positive=False),
     )
-    if limits.lower is not None and limits.upper is not None:
-        if limits.lower >= limits.upper:
-            document.add(location, "min_position must be below max_position")
+    lower, upper = limits.lower, limits.upper
+    if lower is not None and upper is not None and lower >= upper:
+        document.add(location, "min_position must be below max_position")
     return limits

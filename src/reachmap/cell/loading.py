@@ -10,6 +10,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from reachmap.cell.doubts import find_doubts
 from reachmap.cell.files import (
     CellFiles,
     compare_hashes,
@@ -95,6 +96,7 @@ def cell_from_text(
     files = read_files(document, directory)
     if files.robot is not None:
         check_names(document, files.robot, files.srdf_description)
+    warnings = find_doubts(document, cell, files) if cell is not None else ()
     document.raise_mistakes()
     if cell is None or files.robot is None:
         raise CellError(f"{label}: cannot be loaded")
@@ -112,6 +114,7 @@ def cell_from_text(
         files_sha256=files.files_sha256,
         mesh_paths=files.mesh_paths,
         joint_limits=files.joint_limits,
+        warnings=warnings,
     )
 
 
@@ -133,7 +136,7 @@ def _find(name_or_path: str) -> Path:
 
 
 def _validated(document: Document) -> Cell | None:
-    """The model of the document's data; None, with mistakes added, if it is wrong."""
+    """Validate the document's data; None, with mistakes added, if it is wrong."""
     try:
         # Strict, and through JSON: quoted numbers and booleans in number fields are
         # mistakes, while lists may still become tuples.
@@ -148,7 +151,7 @@ def _validated(document: Document) -> Cell | None:
 def _resolved(
     document: Document, cell: Cell, files: CellFiles, directory: Path
 ) -> Cell:
-    """The cell with SRDF names and MoveIt limits written out, paths absolute."""
+    """Write out SRDF names and MoveIt limits, and make paths absolute."""
     data = cell.model_dump(mode="json")
     robot = data["robot"]
     resolver = files.resolver
@@ -174,7 +177,7 @@ def _resolved(
 
 
 def _portable(reference: str, resolver: Resolver) -> str:
-    """The reference as another folder can use it: package:// or absolute."""
+    """Make a reference usable from another folder: package:// or absolute."""
     if reference.startswith(SCHEME):
         return reference
     path = resolver.resolve(reference)

@@ -7,6 +7,7 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
+from reachmap.cell.fields import MAX_LENGTH_M
 from reachmap.cell.model_paths import did_you_mean, known_keys
 from reachmap.cell.yaml_text import Document, Location
 
@@ -43,8 +44,16 @@ def add_validation_errors(
     document: Document, error: ValidationError, model: type[BaseModel]
 ) -> None:
     """Add every problem of a pydantic error to the document as a mistake."""
-    for detail in error.errors(include_url=False):
-        location = strip_tags(detail["loc"], document.data, detail["type"])
+    details = [
+        (strip_tags(detail["loc"], document.data, detail["type"]), detail)
+        for detail in error.errors(include_url=False)
+    ]
+    for location, detail in details:
+        if detail["type"] == "too_short" and any(
+            inner[: len(location)] == location and len(inner) > len(location)
+            for inner, _ in details
+        ):
+            continue  # pydantic counts only the entries that were right
         of_key = detail["type"] == "extra_forbidden"
         message = _sentence(detail, location, document.data, model)
         document.add(location, message, of_key=of_key)
@@ -87,15 +96,23 @@ def _sentence(
     if kind in {"value_error", "assertion_error"}:
         return str(context.get("error", detail["msg"]))
     if kind in _EXPECTED:
-        return f"expected {_EXPECTED[kind]} {found}"
+        quotes = kind == "string_type" and isinstance(detail["input"], int | float)
+        hint = "; write it in quotes" if quotes else ""
+        return f"expected {_EXPECTED[kind]} {found}{hint}"
     if kind in _BOUNDS:
-        words, key = _BOUNDS[kind]
-        return f"expected {words.format(context[key])} {found}"
+        pattern, key = _BOUNDS[kind]
+        bound = context[key]
+        words = pattern.format(f"{bound:g}" if isinstance(bound, float) else bound)
+        metres = (
+            "; lengths are in metres" if bound in (MAX_LENGTH_M, -MAX_LENGTH_M) else ""
+        )
+        return f"expected {words} {found}{metres}"
     if kind in {"too_short", "too_long"}:
         few = kind == "too_short"
         bound = context["min_length" if few else "max_length"]
         return (
-            f"expected at {'least' if few else 'most'} {bound} values "
+            f"expected at {'least' if few else 'most'} {bound} "
+            f"value{'' if bound == 1 else 's'} "
             f"(got {context['actual_length']})"
         )
     if kind in {"literal_error", "enum"}:
@@ -116,5 +133,7 @@ def _missing(location: Location, data: Any) -> str:
 
 
 def _short(value: Any) -> str:
+    if value is None or isinstance(value, bool):
+        return {None: "nothing", True: "true", False: "false"}[value]
     text = repr(value)
     return text if len(text) <= 60 else f"{text[:57]}…"

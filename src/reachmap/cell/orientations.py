@@ -1,4 +1,4 @@
-"""Description of a family of tool orientations."""
+"""Families of tool orientations, as a cell describes them."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from reachmap.cell.fields import Finite, Record, Vector3
+from reachmap.cell.fields import Angle, Angles3, Record
 
 Tilt = Annotated[float, Field(ge=0, lt=180, allow_inf_nan=False)]
 
@@ -19,15 +19,33 @@ class ConeFamily(Record):
     spread evenly over ``roll_span_deg``.
     """
 
-    family: Literal["cone"] = "cone"
-    tilts_deg: tuple[Tilt, ...] = Field((0.0, 30.0), min_length=1, max_length=32)
-    azimuths: tuple[Annotated[int, Field(ge=1, le=360)], ...] = Field(
-        (1, 8), min_length=1, max_length=32
+    family: Literal["cone"] = Field("cone", description="Cones about straight down.")
+    tilts_deg: tuple[Tilt, ...] = Field(
+        (0.0, 30.0),
+        min_length=1,
+        max_length=32,
+        description="Angle of each ring from straight down [deg].",
     )
-    azimuth_offset_deg: Finite = 0.0
-    rolls: int = Field(3, ge=1, le=360)
-    roll_offset_deg: Finite = 0.0
-    roll_span_deg: float = Field(360.0, gt=0, le=360)
+    azimuths: tuple[Annotated[int, Field(ge=1, le=360)], ...] = Field(
+        (1, 8),
+        min_length=1,
+        max_length=32,
+        description="Number of directions in each ring.",
+    )
+    azimuth_offset_deg: Angle = Field(
+        0.0, description="Azimuth of the first direction of each ring [deg]."
+    )
+    rolls: int = Field(
+        3, ge=1, le=360, description="Rolls about each approach direction."
+    )
+    roll_offset_deg: Angle = Field(0.0, description="First roll [deg].")
+    roll_span_deg: float = Field(
+        360.0,
+        gt=0,
+        le=360,
+        description="Range the rolls are spread over [deg]; 180 for a tool that is "
+        "the same when turned by half a turn.",
+    )
 
     @model_validator(mode="after")
     def _rings_agree(self) -> ConeFamily:
@@ -38,12 +56,24 @@ class ConeFamily(Record):
             )
         return self
 
+    def count(self) -> int:
+        """Count the orientations of the family."""
+        return sum(self.azimuths) * self.rolls
+
 
 class ListFamily(Record):
     """Orientations of the TCP, one by one, as roll, pitch, yaw in degrees."""
 
-    family: Literal["list"]
-    rpy_deg: tuple[Vector3, ...] = Field(min_length=1, max_length=1000)
+    family: Literal["list"] = Field(description="Orientations one by one.")
+    rpy_deg: tuple[Angles3, ...] = Field(
+        min_length=1,
+        max_length=1000,
+        description="Roll, pitch, yaw [deg] of the TCP about fixed x, y, z.",
+    )
+
+    def count(self) -> int:
+        """Count the orientations of the family."""
+        return len(self.rpy_deg)
 
 
 OrientationFamily = Annotated[ConeFamily | ListFamily, Field(discriminator="family")]

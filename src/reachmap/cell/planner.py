@@ -17,19 +17,30 @@ PlannerName = Literal[
 class SimplificationSpec(Record):
     """How a found path is shortened; budgets count tries, never seconds."""
 
-    method: Literal["shortcut", "simplify_max", "none"] = "shortcut"
-    rounds: int = Field(3, ge=1, le=1000)
-    tries: int = Field(20, ge=0, le=100000)
+    method: Literal["shortcut", "simplify_max", "none"] = Field(
+        "shortcut",
+        description="shortcut: vertex reduction and shortcuts; simplify_max: OMPL's.",
+    )
+    rounds: int = Field(3, ge=1, le=1000, description="Rounds of simplification.")
+    tries: int = Field(20, ge=0, le=100000, description="Shortcuts tried per round.")
 
 
 class PlannerSpec(Record):
     """The planner, its budget in state checks, and its safety net in seconds."""
 
-    name: PlannerName = "LBKPIECE1"
-    range_rad: Positive | None = Field(0.5, description="Longest motion it adds.")
-    max_checks: int = Field(20000, ge=1, description="Work budget of one attempt.")
-    time_limit_s: Positive = Field(
-        60.0, description="Safety net; recorded when it ends an attempt."
+    name: PlannerName = Field("LBKPIECE1", description="OMPL geometric planner.")
+    range_rad: Positive | None = Field(
+        0.5, description="Longest motion it adds [rad]; null: the planner's default."
     )
-    goal_bias: NonNegative | None = Field(None, le=1)
-    simplification: SimplificationSpec = SimplificationSpec()
+    max_checks: int = Field(
+        20000, ge=1, le=10**9, description="Work budget of one attempt, state checks."
+    )
+    time_limit_s: Positive = Field(
+        60.0, description="Safety net [s]; recorded when it ends an attempt."
+    )
+    goal_bias: NonNegative | None = Field(
+        None, le=1, description="Share of samples taken at a goal, where it has one."
+    )
+    simplification: SimplificationSpec = Field(
+        SimplificationSpec(), description="How a found path is shortened."
+    )

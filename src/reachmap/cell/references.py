@@ -1,4 +1,4 @@
-"""Names and files a cell refers to: do they exist in the URDF and on disk?
+"""Check that the frames, joints, links and bodies a cell names exist.
 
 Works on the plain data of the file, not on the validated model, so that a missing
 mesh is reported together with a misspelt key.
@@ -19,12 +19,11 @@ WORLD = ("world", "robot_base")
 def at(data: Any, *location: str | int) -> Any:
     """Member of nested data at a location, None where there is none."""
     for part in location:
-        if isinstance(data, dict) and part in data:
-            data = data[part]
-        elif isinstance(data, list) and isinstance(part, int) and part < len(data):
-            data = data[part]
-        else:
+        if isinstance(data, list):
+            data = dict(enumerate(data))
+        if not isinstance(data, dict) or part not in data:
             return None
+        data = data[part]
     return data
 
 
@@ -45,6 +44,7 @@ def check_names(
 ) -> None:
     """Add a mistake for every frame, joint, group or body that does not exist."""
     _check_frames(document, robot)
+    _check_body_names(document, robot)
     _check_touch(document, robot)
     _check_srdf_names(document, srdf)
     moving: tuple[str, ...] | None = moving_joints(document.data, robot, srdf)
@@ -92,6 +92,17 @@ def _check_frames(document: Document, robot: UrdfDescription) -> None:
         if name is not None and name not in known:
             hint = did_you_mean(name, known)
             document.add(location, f"no frame {name!r} in the URDF; {hint}")
+
+
+def _check_body_names(document: Document, robot: UrdfDescription) -> None:
+    """Check that no body shares its name with a link or a wall of the bin."""
+    for index, body in enumerate(entries(document.data, "bodies")):
+        name = text_at(body, "name")
+        if name is None:
+            continue
+        if name in robot.links or name in WORLD or name.split(" ")[0] == "bin":
+            message = f"{name!r} is the name of a link, a frame or the bin"
+            document.add(("bodies", index, "name"), message)
 
 
 def _check_touch(document: Document, robot: UrdfDescription) -> None:

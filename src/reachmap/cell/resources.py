@@ -9,9 +9,10 @@ A reference is resolved only where the cell says:
   URDF lies in it; else the folder above the URDF's). Absolute paths and ``file://``
   must lie in that root, in the cell's folder or in a package folder.
 
-Packages are looked up in ``resources.packages`` of the cell, ``$REACHMAP_PACKAGE_PATH``,
-``$ROS_PACKAGE_PATH``, ``share`` of each entry of ``$AMENT_PREFIX_PATH``, the data of the
-installed ``example-robot-data`` distribution, and the cells shipped with reachmap.
+Packages are looked up in ``resources.packages`` of the cell,
+``$REACHMAP_PACKAGE_PATH``, ``$ROS_PACKAGE_PATH``, ``share`` of each entry of
+``$AMENT_PREFIX_PATH``, the data of the installed ``example-robot-data`` distribution,
+and the cells shipped with reachmap.
 """
 
 from __future__ import annotations
@@ -119,7 +120,8 @@ class Resolver:
         allowed += [self.directory / folder for folder in self.packages.values()]
         if not any(path.is_relative_to(_normal(place)) for place in allowed):
             raise NotFoundError(
-                f"{reference!r}: leads out of {root}; add its folder to resources.packages"
+                f"{reference!r}: leads out of {root}; "
+                "add its folder to resources.packages"
             )
         return _existing(reference, [path])
 

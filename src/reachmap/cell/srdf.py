@@ -64,7 +64,7 @@ def _group_joints(
     robot: UrdfDescription,
     depth: int,
 ) -> list[str]:
-    """Moving joints of a group: joints, chains, links' parents and subgroups."""
+    """List the moving joints of a group: its joints, chains, links and groups."""
     names: list[str] = []
     for child in element:
         name = child.get("name", "")

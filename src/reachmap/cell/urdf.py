@@ -8,6 +8,7 @@ is wrong in a sentence.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from xml.etree import ElementTree
 
@@ -52,6 +53,8 @@ class UrdfDescription:
         The link that is nobody's child.
     collision_meshes : tuple of str
         Mesh references of collision elements, each once.
+    mesh_scales : dict
+        Those references to their largest scale per axis.
     visual_meshes : tuple of str
     """
 
@@ -61,9 +64,10 @@ class UrdfDescription:
     root: str
     collision_meshes: tuple[str, ...]
     visual_meshes: tuple[str, ...]
+    mesh_scales: dict[str, tuple[float, float, float]]
 
     def chain(self, base: str, tip: str) -> tuple[str, ...]:
-        """Moving joints on the way from one link to another, base first.
+        """List the moving joints on the way from one link to another, base first.
 
         The way goes up from ``tip``; joints between ``base`` and the ancestor it
         shares with ``tip`` are not included.
@@ -133,6 +137,7 @@ def parse_urdf(text: str, label: str) -> UrdfDescription:
         root=next(link for link in links if link not in children),
         collision_meshes=_meshes(root, "collision"),
         visual_meshes=_meshes(root, "visual"),
+        mesh_scales=_scales(root),
     )
 
 
@@ -245,16 +250,29 @@ def _number_faults(root: ElementTree.Element) -> list[str]:
                 values = []
             if len(values) != count or not all(map(math.isfinite, values)):
                 faults.append(
-                    f"<{tag} {key}>: expected {count} finite numbers (got {text[:40]!r})"
+                    f"<{tag} {key}>: expected {count} finite numbers "
+                    f"(got {text[:40]!r})"
                 )
     return faults
 
 
+def _mesh_elements(
+    root: ElementTree.Element, role: str
+) -> Iterator[ElementTree.Element]:
+    for link in root.findall("link"):
+        for part in link.findall(role):
+            yield from part.iter("mesh")
+
+
 def _meshes(root: ElementTree.Element, role: str) -> tuple[str, ...]:
-    names = (
-        mesh.get("filename", "")
-        for link in root.findall("link")
-        for part in link.findall(role)
-        for mesh in part.iter("mesh")
-    )
+    names = (mesh.get("filename", "") for mesh in _mesh_elements(root, role))
     return tuple(dict.fromkeys(names))
+
+
+def _scales(root: ElementTree.Element) -> dict[str, tuple[float, float, float]]:
+    scales: dict[str, tuple[float, float, float]] = {}
+    for mesh in _mesh_elements(root, "collision"):
+        x, y, z = (abs(float(word)) for word in mesh.get("scale", "1 1 1").split())
+        a, b, c = scales.get(mesh.get("filename", ""), (0.0, 0.0, 0.0))
+        scales[mesh.get("filename", "")] = (max(x, a), max(y, b), max(z, c))
+    return scales

@@ -13,7 +13,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 from ruamel.yaml import YAML
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
@@ -22,7 +22,6 @@ from ruamel.yaml.events import (
     DocumentStartEvent,
     Event,
     MappingEndEvent,
-    MappingStartEvent,
     ScalarEvent,
     SequenceEndEvent,
     SequenceStartEvent,
@@ -131,7 +130,8 @@ def read_text(path: Path, *, limit: int, label: str | None = None) -> str:
     except UnicodeDecodeError as error:
         line = data.count(b"\n", 0, error.start) + 1
         raise CellError(
-            f"{label}:{line}:1: expected UTF-8 text (got byte 0x{data[error.start]:02x})"
+            f"{label}:{line}:1: expected UTF-8 text "
+            f"(got byte 0x{data[error.start]:02x})"
         ) from None
 
 
@@ -228,7 +228,7 @@ class _Builder:
             raise CellError(f"{self._document.source}: the file is empty")
 
     def _value(
-        self, event: Event, location: Location, events: Iterator[Event], depth: int
+        self, event: Any, location: Location, events: Iterator[Event], depth: int
     ) -> Any:
         self._check(event, depth)
         self._document.places[location] = self._place(event)
@@ -273,7 +273,7 @@ class _Builder:
             items[key] = self._value(next(events), inner, events, depth)
         return items
 
-    def _check(self, event: Event, depth: int) -> None:
+    def _check(self, event: Any, depth: int) -> None:
         self._count += 1
         if self._count > MAX_VALUES:
             self._refuse(event, f"more than {MAX_VALUES:,} values")
@@ -284,11 +284,11 @@ class _Builder:
         if getattr(event, "tag", None):
             self._refuse(event, f"tags are not supported (got {str(event.tag)[:60]})")
 
-    def _place(self, event: Event) -> Place:
+    def _place(self, event: Any) -> Place:
         mark = event.start_mark
         return Place(
             source=self._document.source, line=mark.line + 1, column=mark.column + 1
         )
 
-    def _refuse(self, event: Event, message: str) -> None:
+    def _refuse(self, event: Any, message: str) -> NoReturn:
         raise CellError(f"{self._place(event)}: {message}")
