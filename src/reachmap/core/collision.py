@@ -16,13 +16,14 @@ import pinocchio as pin
 
 from reachmap._typing import BoolArray, FloatArray
 from reachmap.core.bodies import BodyGeometry
-from reachmap.core.displacement import displacement_bounds
+from reachmap.core.chain import SerialChain
+from reachmap.core.displacement import MotionBound, displacement_bounds
 from reachmap.core.pairs import drop_pairs_that_never_meet, joints_between
 
 if TYPE_CHECKING:
     from reachmap.core.robot import RobotModel
 
-LADDER_M = (0.004, 0.008, 0.016, 0.032, 0.064, 0.128)
+LADDER_M = (0.004, 0.008, 0.016, 0.032, 0.064)
 WIDEST_M = LADDER_M[-1]
 _NO_PAIR = -1
 
@@ -46,6 +47,8 @@ class CollisionChecker:
         Pairs that were proved never to meet.
     reach_m : array, shape (dof,)
         No point of the robot moves further than ``reach_m @ |Δq|`` [m/rad].
+    bound : MotionBound
+        The tighter bound of a motion from where the robot is.
     checks : int
         Configurations checked so far, the unit in which budgets are counted.
     """
@@ -69,6 +72,9 @@ class CollisionChecker:
             [self.body_pairs.index(name) for name in self._pair_names], dtype=np.int64
         )
         self.reach_m = np.maximum(bounds.max(axis=0, initial=0.0), 1e-9)
+        self.bound = MotionBound(
+            SerialChain.from_robot(robot), robot.model, bodies.geometry, self.reach_m
+        )
         self._shares = _margin_shares(bodies.geometry, bounds, self.reach_m)
         self._hulls = _with_convex_hulls(bodies.geometry)
         self.checks = 0

@@ -9,12 +9,15 @@ joint j; where the two axes are parallel, only distances across the axes add up.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import coal
 import numpy as np
 
 from reachmap._typing import FloatArray
+
+if TYPE_CHECKING:
+    from reachmap.core.chain import SerialChain
 
 
 def displacement_bounds(model: Any, geometry: Any) -> FloatArray:
@@ -35,6 +38,84 @@ def displacement_bounds(model: Any, geometry: Any) -> FloatArray:
         points = points @ body.placement.rotation.T + body.placement.translation
         _fill_row(row, model, axes, body.parentJoint, points)
     return bounds
+
+
+class MotionBound:
+    """Displacement along short straight motions, from where the robot really is.
+
+    The bounds R hold for the stretched-out arm. For a motion q ± sΔ, 0 ≤ s ≤ 1, a
+    point X moves no further than ``‖J_X(q) Δ‖ + ½ (Σ|Δ_i|)(Σ R_j |Δ_j|)``: Taylor, with
+    the second term over revolute joints i. The first is largest at a corner of the
+    hull of the bodies, since it is convex in X.
+
+    Parameters
+    ----------
+    chain : SerialChain
+    model : pinocchio.Model
+    geometry : pinocchio.GeometryModel
+    reach_m : array, shape (dof,)
+        Largest R of each joint.
+    """
+
+    def __init__(
+        self, chain: SerialChain, model: Any, geometry: Any, reach_m: FloatArray
+    ) -> None:
+        self._chain = chain
+        self._reach_m = reach_m
+        self._corners = _corners_by_joint(chain, model, geometry)
+
+    def displacement_m(self, Q: FloatArray, half_change: FloatArray) -> FloatArray:
+        """Bound for motions ``Q[k] ± half_change``, any part of them included.
+
+        Parameters
+        ----------
+        Q : array, shape (n, dof)
+        half_change : array, shape (dof,)
+
+        Returns
+        -------
+        array, shape (n,)
+            For the part of relative size f of the motion, f times this holds about
+            the part's own middle.
+        """
+        frames = self._chain.joint_frames_many(Q)
+        origin, axis = frames[..., :3, 3], frames[..., :3, 2]
+        turning = axis * np.where(self._chain.is_revolute, half_change, 0.0)[:, None]
+        sliding = axis * np.where(self._chain.is_revolute, 0.0, half_change)[:, None]
+        # Velocity of a point X on joint k: Σ_{j ≤ k} (a_j × (X − o_j)) Δ_j.
+        angular = np.cumsum(turning, axis=1)
+        linear = np.cumsum(sliding + np.cross(origin, turning), axis=1)
+        corners = frames[..., :3, :3] @ self._corners + origin[..., None]
+        velocity = np.cross(angular[..., None], corners, axisa=2, axisb=2, axisc=2)
+        speed = np.linalg.norm(velocity + linear[..., None], axis=2)
+        first = speed.max(axis=(1, 2))
+        size = np.abs(half_change)
+        second = size[self._chain.is_revolute].sum() * float(size @ self._reach_m)
+        return np.asarray(first + second)
+
+
+def _corners_by_joint(chain: SerialChain, model: Any, geometry: Any) -> FloatArray:
+    """Corners of a box around all bodies of each joint, shape (dof, 3, 8).
+
+    In the chain's joint frames, whose z is the joint axis.
+    """
+    frames = chain.joint_rotations(model)
+    corners = np.zeros((chain.dof, 3, len(_SIGNS)))
+    for k in range(chain.dof):
+        points = [
+            (
+                _corner_points(body.geometry) @ body.placement.rotation.T
+                + body.placement.translation
+            )
+            @ frames[k]
+            for body in geometry.geometryObjects
+            if body.parentJoint == k + 1
+        ]
+        if points:
+            cloud = np.vstack(points)
+            low, high = cloud.min(axis=0), cloud.max(axis=0)
+            corners[k] = ((low + high) / 2 + _SIGNS * (high - low) / 2).T
+    return corners
 
 
 def _fill_row(

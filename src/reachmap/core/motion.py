@@ -24,6 +24,10 @@ import numpy as np
 from reachmap._typing import FloatArray
 from reachmap.core.collision import WIDEST_M, CollisionChecker
 
+# A piece is short enough (sum over joints) for its second-order term to be small.
+PIECE_RAD = 0.4
+_Piece = tuple[float, float, float]
+
 
 class MotionChecker:
     """Checks of straight motions between configurations.
@@ -63,22 +67,39 @@ class MotionChecker:
         """Check a motion, ends included, at the verification distance."""
         checker = self.checker
         change = q_to - q_from
-        half_width_m = 0.5 * float(np.abs(change) @ checker.reach_m)
         finest_m = self.verification_distance_m / 2
-        pending = deque([(0.5, half_width_m)])
+        pending = self._pieces(q_from, change)
         while pending:
-            share, reach_m = pending.popleft()
+            share, half_share, reach_m = pending.popleft()
             q = q_from + share * change
             if finest_m < reach_m <= WIDEST_M and checker.is_clear(q, reach_m):
                 continue
             if not checker.is_free(q):
                 return False
             if reach_m > finest_m:
-                reach_m /= 2
-                offset = 0.5 * reach_m / half_width_m
-                pending.append((share - offset, reach_m))
-                pending.append((share + offset, reach_m))
+                half_share, reach_m = half_share / 2, reach_m / 2
+                pending.append((share - half_share, half_share, reach_m))
+                pending.append((share + half_share, half_share, reach_m))
         return True
+
+    def _pieces(self, q_from: FloatArray, change: FloatArray) -> deque[_Piece]:
+        """Pieces that cover a motion: middle, half width (as shares), displacement."""
+        checker = self.checker
+        size = np.abs(change)
+        half_width_m = 0.5 * float(size @ checker.reach_m)
+        if half_width_m <= WIDEST_M:
+            return deque([(0.5, 0.5, half_width_m)])
+        count = math.ceil(float(size.sum()) / PIECE_RAD)
+        shares = (np.arange(count) + 0.5) / count
+        reach_m = np.minimum(
+            checker.bound.displacement_m(
+                q_from + shares[:, None] * change, change / (2 * count)
+            ),
+            half_width_m / count,
+        )
+        order = [0, *_halving(count)] if count > 1 else [0]
+        half_share = 0.5 / count
+        return deque((float(shares[k]), half_share, float(reach_m[k])) for k in order)
 
     def path_is_verified(self, path: FloatArray) -> bool:
         """:meth:`is_verified` of every segment, shape (n, dof)."""
@@ -100,18 +121,21 @@ class MotionChecker:
 
 @lru_cache(maxsize=4096)
 def _middle_first(steps: int) -> tuple[float, ...]:
-    """Inner points k/steps in the order of repeated halving (van der Corput).
+    """Inner points k/steps of a motion, collisions being found soonest so."""
+    return tuple(k / steps for k in _halving(steps))
 
-    Collisions are found sooner than by walking from one end.
-    """
-    order: list[float] = []
+
+@lru_cache(maxsize=4096)
+def _halving(steps: int) -> tuple[int, ...]:
+    """Numbers 1 … steps − 1 in the order of repeated halving (van der Corput)."""
+    order: list[int] = []
     spans = deque([(1, steps - 1)])
     while spans:
         low, high = spans.popleft()
         if low > high:
             continue
         middle = (low + high) // 2
-        order.append(middle / steps)
+        order.append(middle)
         spans.append((low, middle - 1))
         spans.append((middle + 1, high))
     return tuple(order)
