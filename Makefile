@@ -10,7 +10,7 @@ GRASPS ?= examples/pile-1.json
 RUN    ?= run
 WORKERS ?= $(JOBS)
 # Sizes of a quick look; `make SIZE=` or `make paper` uses the cell's own.
-SIZE   ?= --set bin_scan.repeats=2 --set bin_scan.grid=[10,7]
+SIZE   ?= --set bin_scan.repeats=2 --set 'bin_scan.grid=[10,7]'
 
 BIN      := $(VENV)/bin
 PIP      := $(BIN)/python -m pip --disable-pip-version-check --quiet
