@@ -36,6 +36,7 @@ class PipelineGroup(click.Group):
         if entry is None or not entry.is_available():
             return None
         command: click.Command = import_module(entry.module).command
+        command.name = cmd_name
         if not any(parameter.name == "verbose" for parameter in command.params):
             command.params.extend(verbosity_parameters())
         return command

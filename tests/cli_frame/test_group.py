@@ -256,7 +256,7 @@ def test_table_line_is_the_first_sentence_of_the_help(name: str) -> None:
     assert command is not None
     first = " ".join((command.help or "").split("\n\n")[0].split())
     assert first == COMMANDS[name].help
-    assert command.name == name, "give the name to click.command"
+    assert command.name == name
 
 
 @pytest.mark.parametrize("name", AVAILABLE)
@@ -274,9 +274,3 @@ def test_every_help_has_an_example_and_explains_its_options(name: str) -> None:
         if isinstance(parameter, click.Option) and not parameter.help
     ]
     assert not bare, f"options without help: {bare}"
-
-
-@pytest.mark.parametrize("name", AVAILABLE)
-def test_commands_are_named_after_their_file_and_call_one_tool(name: str) -> None:
-    """File, table and command agree on the name."""
-    assert COMMANDS[name].module == f"reachmap.cli.{name.replace('-', '_')}"
