@@ -1,0 +1,74 @@
+"""What a ranking can be asked for: weights, likeness, neighbours, roll."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final, Literal, TypeAlias
+
+from reachmap.errors import SettingsError
+
+Roll: TypeAlias = Literal["as-given", "free", "fixed"]
+ROLLS: Final[tuple[Roll, ...]] = ("as-given", "free", "fixed")
+MAX_WEIGHT: Final = 1e6
+MAX_NEIGHBOURS: Final = 64
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RankSettings:
+    """J = α φ3 + β φ4 + δ φ5 + ε φ6, and how test grasps are matched.
+
+    Attributes
+    ----------
+    weights : (float, float, float)
+        α, β, δ of path length, planning time and execution time.
+    likeness : float
+        ε of the distance to the test grasp; 0 is the paper's J.
+    neighbours : int
+        Test points whose costs are blended; 1 is the paper's nearest.
+    roll : {"as-given", "free", "fixed"}
+        Whether the roll about the approach counts. As given: it does for grasps
+        with a full orientation and not for those with a direction.
+    """
+
+    weights: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    likeness: float = 0.0
+    neighbours: int = 1
+    roll: Roll = "as-given"
+
+    def __post_init__(self) -> None:
+        if len(self.weights) != 3:
+            raise SettingsError(f"three weights are needed (got {len(self.weights)})")
+        named = zip(("alpha", "beta", "delta"), self.weights, strict=True)
+        problems = [_weight_problem(name, value) for name, value in named]
+        problems.append(_weight_problem("likeness", self.likeness))
+        if not 1 <= self.neighbours <= MAX_NEIGHBOURS:
+            problems.append(
+                f"neighbours must be 1 to {MAX_NEIGHBOURS} (got {self.neighbours})"
+            )
+        if self.roll not in ROLLS:
+            problems.append(f"roll must be one of {', '.join(ROLLS)} ({self.roll!r})")
+        if not any(self.weights) and not self.likeness:
+            problems.append("one weight at least must be above 0")
+        mistakes = [problem for problem in problems if problem]
+        if mistakes:
+            raise SettingsError(mistakes)
+
+    @classmethod
+    def of(
+        cls, weights: Sequence[float], likeness: float, neighbours: int, roll: Roll
+    ) -> RankSettings:
+        """Make settings of loose values."""
+        return cls(
+            weights=tuple(weights),  # type: ignore[arg-type]
+            likeness=likeness,
+            neighbours=neighbours,
+            roll=roll,
+        )
+
+
+def _weight_problem(name: str, value: float) -> str:
+    if math.isfinite(value) and 0 <= value <= MAX_WEIGHT:
+        return ""
+    return f"weight {name} must be between 0 and {MAX_WEIGHT:g} (got {value:g})"
