@@ -1,0 +1,227 @@
+"""Bin map, point by point: reachability after one and after all attempts, and costs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+
+from reachmap._typing import FloatArray
+from reachmap.maps.records import BinMap
+from reachmap.plots.bin_view import (
+    BinView,
+    attempted,
+    found_after,
+    frame_bin,
+    percent_after,
+    view_of,
+)
+from reachmap.plots.squares import (
+    MISSING,
+    PERCENT_SCALE,
+    axis_titles,
+    colour_bar,
+    draw_squares,
+    number_size,
+)
+from reachmap.plots.style import (
+    COST_MAP,
+    PercentMap,
+    axes_at,
+    colour_map,
+    drawing,
+    new_figure,
+    put_title,
+)
+
+LEFT, RIGHT, TOP, BOTTOM = 0.80, 0.95, 1.05, 0.60
+WIDEST, TALLEST = 6.0, 6.0
+
+
+@drawing()
+def draw_reachability(
+    bin_map: BinMap, layer: int = 0, *, percent_map: PercentMap = "RdYlGn"
+) -> Figure:
+    """Reachability of each point after 1 and after all attempts (Fig. 6b).
+
+    Parameters
+    ----------
+    bin_map : BinMap
+    layer : int
+        Index of the layer of test grasps.
+    """
+    view = view_of(bin_map)
+    repeats = bin_map.path_found.shape[-1]
+    counts = [1] if repeats == 1 else [1, repeats]
+    low, high = view.view()
+    scale_in = min(WIDEST / (high[0] - low[0]), TALLEST / (high[1] - low[1]))
+    width, height = (high - low) * scale_in
+    figure = new_figure(
+        LEFT + len(counts) * (width + 0.35) - 0.35 + RIGHT, BOTTOM + height + TOP
+    )
+    left = LEFT
+    for column, attempts in enumerate(counts):
+        left = LEFT + column * (width + 0.35)
+        axes = axes_at(figure, left, BOTTOM, width, height)
+        mesh = draw_squares(
+            axes,
+            bin_map.x,
+            bin_map.y,
+            percent_after(bin_map, attempts)[layer],
+            colours=colour_map(percent_map),
+            scale=PERCENT_SCALE,
+            font_size=number_size(bin_map.x, bin_map.y, scale_in),
+            halo=False,
+        )
+        frame_bin(axes, view)
+        axis_titles(axes, "the bin")
+        axes.set_title(_share_text(bin_map, layer, attempts), loc="left", pad=6)
+        if column:
+            axes.set_ylabel("")
+            axes.tick_params(labelleft=False)
+    bar = (left + width + 0.15, BOTTOM, 0.16, height)
+    colour_bar(figure, mesh, bar, "Path reachability [%]")
+    put_title(figure, LEFT, "Path reachability in the bin", _subtitle(view, layer))
+    return figure
+
+
+def _share_text(bin_map: BinMap, layer: int, attempts: int) -> str:
+    tried = attempted(bin_map)[layer]
+    hit = int((found_after(bin_map, attempts)[layer] & tried).sum())
+    total = int(tried.sum())
+    share = f"{100.0 * hit / total:.2f} %" if total else "not attempted"
+    word = "attempt" if attempts == 1 else "attempts"
+    return f"after {attempts} {word} · {share} ({hit} of {total} test grasps)"
+
+
+def _subtitle(view: BinView, layer: int) -> str:
+    parts = ("seen from above", view.layer_text(layer), view.cell_name)
+    return " · ".join(part for part in parts if part)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Panel:
+    title: str
+    unit: str
+    values: FloatArray
+    digits: int
+
+    def text(self, value: float) -> str:
+        return MISSING if np.isnan(value) else f"{value:.{self.digits}f}"
+
+
+@drawing()
+def draw_costs(
+    bin_map: BinMap, cost: FloatArray | None = None, layer: int = 0
+) -> Figure:
+    """Path length, planning time, execution time and cost J of each point.
+
+    A point shows the mean over its test grasps that were reached, each of which is
+    the mean over its successful attempts.
+
+    Parameters
+    ----------
+    bin_map : BinMap
+    cost : array, shape (nl, ny, nx, no), optional
+        J of each test grasp; not finite where it is not path reachable. Without it
+        there are three panels.
+    layer : int
+        Index of the layer of test grasps.
+    """
+    view = view_of(bin_map)
+    panels = _cost_panels(bin_map, cost, layer)
+    low, high = view.view()
+    scale_in = min(5.6 / (high[0] - low[0]), TALLEST / (high[1] - low[1]))
+    width, height = (high - low) * scale_in
+    across, down = width + 1.15, height + 0.75
+    figure = new_figure(LEFT + 2 * across - 0.35, 2 * down + BOTTOM + TOP - 0.75)
+    for index, panel in enumerate(panels):
+        row, column = divmod(index, 2)
+        left, bottom = LEFT + column * across, BOTTOM + (1 - row) * down
+        axes = axes_at(figure, left, bottom, width, height)
+        mesh = draw_squares(
+            axes,
+            bin_map.x,
+            bin_map.y,
+            panel.values,
+            colours=colour_map(COST_MAP),
+            scale=_range(panel.values),
+            text=panel.text,
+            font_size=number_size(bin_map.x, bin_map.y, scale_in, 4),
+            halo=False,
+        )
+        frame_bin(axes, view)
+        axis_titles(axes, "the bin")
+        axes.set_title(_panel_title(panel), loc="left", pad=6)
+        bar = (left + width + 0.12, bottom, 0.14, height)
+        legend = colour_bar(figure, mesh, bar, "", step=None)
+        legend.ax.set_title(panel.unit, fontsize=8.5, pad=6)
+        if column:
+            axes.set_ylabel("")
+        if row == 0 and index + 2 < len(panels):
+            axes.set_xlabel("")
+    subtitle = (
+        f"mean over the test grasps reached at each point · {_subtitle(view, layer)}"
+    )
+    put_title(figure, LEFT, "What reaching into the bin costs", subtitle)
+    return figure
+
+
+def _cost_panels(bin_map: BinMap, cost: FloatArray | None, layer: int) -> list[_Panel]:
+    cpu = _point_means(bin_map.planning_cpu_time[layer])
+    milliseconds = bool(np.nanmax(cpu, initial=0.0) < 1.0)
+    planning = cpu * 1000.0 if milliseconds else cpu
+    named = [
+        ("Path length", "rad", _point_means(bin_map.path_length[layer])),
+        ("Planning time (CPU)", "ms" if milliseconds else "s", planning),
+        ("Execution time", "s", _point_means(bin_map.execution_time[layer])),
+    ]
+    if cost is not None:
+        named.append(
+            (
+                "Cost J",
+                "",
+                _mean(np.where(np.isfinite(cost[layer]), cost[layer], np.nan)),
+            )
+        )
+    return [
+        _Panel(title=title, unit=unit, values=values, digits=_digits(values))
+        for title, unit, values in named
+    ]
+
+
+def _panel_title(panel: _Panel) -> str:
+    if np.isnan(panel.values).all():
+        return f"{panel.title} · nothing reached"
+    mean = float(np.nanmean(panel.values))
+    unit = f" {panel.unit}" if panel.unit else ""
+    return f"{panel.title} · mean {mean:.{panel.digits}f}{unit}"
+
+
+def _point_means(values: FloatArray) -> FloatArray:
+    """Mean over attempts, then over orientations: (ny, nx, no, nr) to (ny, nx)."""
+    return _mean(_mean(values))
+
+
+def _mean(values: FloatArray) -> FloatArray:
+    """Mean along the last axis over what is not NaN; NaN where nothing is."""
+    known = ~np.isnan(values)
+    with np.errstate(invalid="ignore"):
+        return np.asarray(
+            np.where(known, values, 0.0).sum(axis=-1) / known.sum(axis=-1)
+        )
+
+
+def _digits(values: FloatArray) -> int:
+    """Decimals that leave three significant digits of the largest."""
+    top = float(np.nanmax(values, initial=0.0))
+    return 0 if top >= 100.0 else 1 if top >= 10.0 else 2
+
+
+def _range(values: FloatArray) -> Normalize:
+    if np.isnan(values).all():
+        return Normalize(0.0, 1.0)
+    low, high = float(np.nanmin(values)), float(np.nanmax(values))
+    return Normalize(low, high if high > low else low + 1.0)
