@@ -13,7 +13,7 @@ WORKERS ?= $(JOBS)
 SIZE   ?= --set bin_scan.repeats=2 --set 'bin_scan.grid=[10,7]'
 
 BIN      := $(VENV)/bin
-PIP      := $(BIN)/python -m pip --disable-pip-version-check --quiet
+PIP      := $(BIN)/python -m pip --disable-pip-version-check -qq
 REACHMAP := $(BIN)/reachmap
 SCAN     := -j $(WORKERS) --overwrite
 RESULTS  := $(RUN)/.heatmaps $(RUN)/ranked.json $(RUN)/report.html
