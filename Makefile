@@ -50,7 +50,7 @@ lint: $(VENV)/.dev view ## Format, lint, types, architecture
 check: lint docs ## All checks that are not tests
 
 docs: $(VENV)/.dev ## Build the documentation into build/docs; warnings are errors
-	$(BIN)/python -m sphinx -W --keep-going -q -b html docs build/docs
+	$(BIN)/python -m sphinx -E -W --keep-going -q -b html docs build/docs
 	@echo "Open build/docs/index.html"
 
 bench: $(VENV)/.dev ## Run the benchmarks, one after the other
