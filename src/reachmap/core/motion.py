@@ -89,17 +89,28 @@ class MotionChecker:
         half_width_m = 0.5 * float(size @ checker.reach_m)
         if half_width_m <= WIDEST_M:
             return deque([(0.5, 0.5, half_width_m)])
-        count = math.ceil(float(size.sum()) / PIECE_RAD)
-        shares = (np.arange(count) + 0.5) / count
+        coarse = math.ceil(float(size.sum()) / PIECE_RAD)
+        middles = (np.arange(coarse) + 0.5) / coarse
         reach_m = np.minimum(
             checker.bound.displacement_m(
-                q_from + shares[:, None] * change, change / (2 * count)
+                q_from + middles[:, None] * change, change / (2 * coarse)
             ),
-            half_width_m / count,
+            half_width_m / coarse,
         )
-        order = [0, *_halving(count)] if count > 1 else [0]
-        half_share = 0.5 / count
-        return deque((float(shares[k]), half_share, float(reach_m[k])) for k in order)
+        # As wide as the ladder can prove at once, no wider.
+        parts = np.maximum(1, np.ceil(reach_m / WIDEST_M)).astype(int)
+        pieces = [
+            (
+                middle + (2 * part + 1 - count) / (2 * coarse * count),
+                0.5 / coarse / count,
+                reach / count,
+            )
+            for middle, count, reach in zip(
+                middles.tolist(), parts.tolist(), reach_m.tolist(), strict=True
+            )
+            for part in range(count)
+        ]
+        return deque(pieces[k] for k in (0, *_halving(len(pieces))))
 
     def path_is_verified(self, path: FloatArray) -> bool:
         """:meth:`is_verified` of every segment, shape (n, dof)."""
