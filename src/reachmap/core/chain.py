@@ -15,7 +15,8 @@ import numpy as np
 import pinocchio as pin
 
 from reachmap._typing import BoolArray, FloatArray
-from reachmap.core.robot import TCP_FRAME, RobotModel
+from reachmap.core.robot import RobotModel
+from reachmap.core.robot_assembly import TCP_FRAME
 from reachmap.geometry import inverse_transform, transform_from_parts
 
 # Rows per block: the block's arrays, half a megabyte, stay in the cache.
@@ -127,17 +128,28 @@ class SerialChain:
         return T, J
 
     def _steps(self, Q: FloatArray) -> FloatArray:
-        """Transforms from joint to joint, (n, dof) to (dof, n, 4, 4)."""
-        fixed = self.T_fixed[:-1, None]
-        steps = np.empty((self.dof, len(Q), 4, 4))
-        c, s = np.cos(Q.T)[:, :, None], np.sin(Q.T)[:, :, None]
-        steps[..., 0] = fixed[..., 0] * c + fixed[..., 1] * s
-        steps[..., 1] = fixed[..., 1] * c - fixed[..., 0] * s
-        steps[..., 2:] = fixed[..., 2:]
+        """Compute the transforms from joint to joint, (n, dof) to (dof, n, 4, 4)."""
+        # Per joint F Rz(q) = A + cos(q) B + sin(q) C: three sweeps over contiguous
+        # memory; a matrix product would be faster, but rounds differently by size.
+        A, B, C = self._parts()
+        steps = np.cos(Q.T)[:, :, None] * B[:, None]
+        steps += np.sin(Q.T)[:, :, None] * C[:, None]
+        steps += A[:, None]
+        steps = steps.reshape(self.dof, len(Q), 4, 4)
         for k in np.flatnonzero(~self.is_revolute):
             steps[k] = self.T_fixed[k]
             steps[k, :, :, 3] += Q[:, k, None] * self.T_fixed[k, :, 2]
         return steps
+
+    def _parts(self) -> FloatArray:
+        """Constant, cosine and sine part of each joint, shape (3, dof, 16)."""
+        parts = np.zeros((3, self.dof, 4, 4))
+        fixed = self.T_fixed[:-1]
+        parts[0, :, :, 2:] = fixed[..., 2:]
+        parts[1, :, :, :2] = fixed[..., :2]
+        parts[2, :, :, 0] = fixed[..., 1]
+        parts[2, :, :, 1] = -fixed[..., 0]
+        return parts.reshape(3, self.dof, 16)
 
 
 def pose_error(T_goal: FloatArray, T: FloatArray) -> FloatArray:

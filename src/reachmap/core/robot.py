@@ -7,25 +7,29 @@ are in *base*.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pinocchio as pin
 
 from reachmap._typing import BoolArray, FloatArray
-from reachmap.cell.model import JointLimits, RobotSpec
-from reachmap.core.limits import JointRange, LimitTable, merge_limits
-from reachmap.core.urdf import UrdfJoints, read_group, read_urdf_joints
+from reachmap.cell.model import IkSpec, RobotSpec
+from reachmap.core.robot_assembly import (
+    BaseToTip,
+    add_tcp,
+    find_frame,
+    locked_positions,
+    model_from_text,
+    moving_joints,
+    reduced_model,
+)
+from reachmap.core.urdf import read_urdf_joints
 from reachmap.errors import SceneError
 from reachmap.geometry import inverse_transform
 
 if TYPE_CHECKING:
     from reachmap.cell.loading import LoadedCell
-
-TCP_FRAME = "reachmap_tcp"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -36,7 +40,7 @@ class RobotModel:
     ----------
     model : pinocchio.Model
         Joints that do not move are locked and gone; ``nq == nv == dof``, and the
-        TCP is its frame `TCP_FRAME`.
+        TCP is its frame ``reachmap_tcp``.
     urdf : str
         URDF text; link geometry is built from it and `model` with
         ``pin.buildGeomFromUrdfString``.
@@ -51,8 +55,14 @@ class RobotModel:
         With the cell's scaling.
     base_frame : str
         URDF frame called ``robot_base``.
-    T_root_base : array, shape (4, 4)
+    ik : IkSpec
+        How the cell wants inverse kinematics solved.
+    T_root_base, T_base_root : array, shape (4, 4)
+        robot_base in the root link, and the inverse.
     T_world_base : array, shape (4, 4)
+        robot_base in the cell's world.
+    T_root_world : array, shape (4, 4)
+        The cell's world in the root link.
     tcp_joint : int
         Index in `model` of the joint that carries the TCP.
     T_joint_tcp : array, shape (4, 4)
@@ -69,12 +79,18 @@ class RobotModel:
     velocity_rad_s: FloatArray
     acceleration_rad_s2: FloatArray
     base_frame: str
+    ik: IkSpec
     T_root_base: FloatArray
+    T_base_root: FloatArray = field(init=False)
     T_world_base: FloatArray
+    T_root_world: FloatArray = field(init=False)
     tcp_joint: int
     T_joint_tcp: FloatArray
 
     def __post_init__(self) -> None:
+        T_base_world = inverse_transform(self.T_world_base)
+        object.__setattr__(self, "T_base_root", inverse_transform(self.T_root_base))
+        object.__setattr__(self, "T_root_world", self.T_root_base @ T_base_world)
         for name in type(self).__slots__:
             value = getattr(self, name)
             if isinstance(value, np.ndarray):
@@ -92,7 +108,7 @@ class RobotModel:
         """
         return cls.from_spec(
             loaded.cell.robot,
-            urdf=loaded.urdf,
+            urdf=loaded.urdf_for_engine,
             srdf=loaded.srdf,
             package_dirs=[str(folder) for folder in loaded.package_dirs],
             moveit_limits=loaded.joint_limits,
@@ -120,14 +136,14 @@ class RobotModel:
             A parsed ``joint_limits.yaml``.
         """
         description = read_urdf_joints(urdf)
-        full = _model_from_text(description.text)
-        chain = _Chain.between(full, spec.base_frame, spec.tcp.parent)
-        moving = _moving_joints(full, spec, srdf, chain.joints)
-        q_locked = _locked_positions(full, spec, description, moving)
-        model, limits = _reduce(
+        full = model_from_text(description.text)
+        chain = BaseToTip.between(full, spec.base_frame, spec.tcp.parent)
+        moving = moving_joints(full, spec, srdf, chain.joints)
+        q_locked = locked_positions(full, spec, description, moving)
+        model, limits = reduced_model(
             full, moving, q_locked, description, spec.limits, moveit_limits
         )
-        tcp = _add_tcp(model, spec)
+        tcp = add_tcp(model, spec)
         root_base = model.frames[model.getFrameId(chain.base)].placement
         return cls(
             model=model,
@@ -140,6 +156,7 @@ class RobotModel:
             velocity_rad_s=limits.velocity,
             acceleration_rad_s2=limits.acceleration,
             base_frame=chain.base,
+            ik=spec.ik,
             T_root_base=np.array(root_base.homogeneous),
             T_world_base=spec.base_pose.matrix(),
             tcp_joint=int(tcp.parentJoint),
@@ -150,16 +167,6 @@ class RobotModel:
     def dof(self) -> int:
         """Number of joints that move."""
         return len(self.joint_names)
-
-    @property
-    def T_base_root(self) -> FloatArray:
-        """Root link (Pinocchio's universe) in robot_base, shape (4, 4)."""
-        return inverse_transform(self.T_root_base)
-
-    @property
-    def T_root_world(self) -> FloatArray:
-        """The cell's world in the root link, shape (4, 4)."""
-        return self.T_root_base @ inverse_transform(self.T_world_base)
 
     def frame_placement(self, name: str) -> tuple[int, FloatArray]:
         """Where a frame is fixed.
@@ -185,7 +192,7 @@ class RobotModel:
             return 0, self.T_root_world
         if name == "robot_base":
             return 0, np.array(self.T_root_base)
-        frame = self.model.frames[_frame_id(self.model, name, "frame")]
+        frame = self.model.frames[find_frame(self.model, name, "frame")]
         return int(frame.parentJoint), np.array(frame.placement.homogeneous)
 
     def configuration(self, values: Mapping[str, float], where: str) -> FloatArray:
@@ -223,166 +230,3 @@ class RobotModel:
         return tuple(
             name for name, out in zip(self.joint_names, outside, strict=True) if out
         )
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Chain:
-    """Base frame, and the joints from it to the TCP."""
-
-    base: str
-    joints: tuple[str, ...]
-
-    @classmethod
-    def between(cls, model: Any, base: str | None, tip: str) -> _Chain:
-        tip_id = _frame_id(model, tip, "robot.tcp.parent")
-        base = base or _root_link(model)
-        base_id = _frame_id(model, base, "robot.base_frame")
-        above_tip = [j for j in model.supports[model.frames[tip_id].parentJoint] if j]
-        base_joint = model.frames[base_id].parentJoint
-        above_base = [j for j in model.supports[base_joint] if j]
-        if above_tip[: len(above_base)] != above_base:
-            raise SceneError(
-                f"robot.base_frame: {base!r} is not on the way from the root link "
-                f"to {tip!r}"
-            )
-        joints = tuple(model.names[j] for j in above_tip[len(above_base) :])
-        if not joints:
-            raise SceneError(
-                f"robot.tcp.parent: no joint moves {tip!r} relative to {base!r}"
-            )
-        return cls(base=base, joints=joints)
-
-
-def _model_from_text(urdf: str) -> Any:
-    try:
-        return pin.buildModelFromXML(urdf)
-    except Exception as error:
-        raise SceneError(f"robot.urdf: Pinocchio refuses it ({error})") from error
-
-
-def _root_link(model: Any) -> str:
-    bodies = [f for f in model.frames if f.type == pin.FrameType.BODY]
-    return str(bodies[0].name)
-
-
-def _frame_id(model: Any, name: str, where: str) -> int:
-    if not model.existFrame(name):
-        names = [f.name for f in model.frames if f.name != "universe"]
-        raise SceneError(
-            f"{where}: the URDF has no frame {name!r} (frames: {', '.join(names)})"
-        )
-    wanted = pin.FrameType.BODY
-    # Links and joints may share a name; a link is meant first.
-    if model.existFrame(name, wanted):
-        return int(model.getFrameId(name, wanted))
-    return int(model.getFrameId(name))
-
-
-def _moving_joints(
-    model: Any, spec: RobotSpec, srdf: str, chain: Sequence[str]
-) -> list[str]:
-    """Joints that move, in chain order."""
-    if spec.joints is not None:
-        where, wanted = "robot.joints", spec.joints
-    elif spec.group is not None:
-        where, wanted = "robot.group", _group_members(model, spec.group, srdf)
-    else:
-        where, wanted = "robot.joints", chain
-    locked = spec.locked_joints_deg
-    problems = [
-        f"{where}: joint {name!r} does not move the TCP (joints: {', '.join(chain)})"
-        for name in wanted
-        if name not in chain
-    ]
-    if spec.joints is not None:
-        problems += [
-            f"robot.locked_joints_deg: joint {name!r} is also in robot.joints"
-            for name in spec.joints
-            if name in locked
-        ]
-    names = list(model.names)[1:]
-    problems += [
-        f"robot.locked_joints_deg: no joint {name!r} (joints: {', '.join(names)})"
-        for name in locked
-        if name not in names
-    ]
-    moving = [name for name in chain if name in wanted and name not in locked]
-    if not moving:
-        problems.append(f"{where}: no joint is left that moves")
-    if problems:
-        raise SceneError(problems)
-    return moving
-
-
-def _group_members(model: Any, group: str, srdf: str) -> tuple[str, ...]:
-    joints, ends = read_group(srdf, group)
-    if ends is not None:
-        joints += _Chain.between(model, ends[0], ends[1]).joints
-    # Groups also list fixed joints, which no model has.
-    return tuple(name for name in joints if model.existJointName(name))
-
-
-def _locked_positions(
-    model: Any, spec: RobotSpec, urdf: UrdfJoints, moving: Sequence[str]
-) -> FloatArray:
-    """Reference configuration of the full model [rad or m], shape (nq,)."""
-    following = [name for name in moving if name in urdf.mimics]
-    if following:
-        raise SceneError(
-            f"robot.urdf: joint(s) {', '.join(following)} follow another joint "
-            "(mimic), which is not supported between base and TCP; lock them or "
-            "give robot.joints"
-        )
-    # Zero, or the nearest position allowed: some joints (Panda's elbow) exclude it.
-    q = np.clip(0.0, model.lowerPositionLimit, model.upperPositionLimit)
-    for name, value in spec.locked_joints_deg.items():
-        turns = urdf.types[name] != "prismatic"
-        q[_index(model, name)] = math.radians(value) if turns else value
-    for name, mimic in urdf.mimics.items():
-        if name in spec.locked_joints_deg or not model.existJointName(mimic.joint):
-            continue
-        leader = q[_index(model, mimic.joint)]
-        q[_index(model, name)] = mimic.multiplier * leader + mimic.offset
-    return np.asarray(q, float)
-
-
-def _index(model: Any, joint: str) -> int:
-    return int(model.idx_qs[model.getJointId(joint)])
-
-
-def _reduce(
-    full: Any,
-    moving: Sequence[str],
-    q_locked: FloatArray,
-    urdf: UrdfJoints,
-    cell: JointLimits,
-    moveit: Mapping[str, Any] | None,
-) -> tuple[Any, LimitTable]:
-    ranges = [
-        JointRange(
-            name=name,
-            kind=urdf.types[name],
-            lower=float(full.lowerPositionLimit[_index(full, name)]),
-            upper=float(full.upperPositionLimit[_index(full, name)]),
-            velocity=float(full.velocityLimit[_index(full, name)]),
-        )
-        for name in moving
-    ]
-    limits = merge_limits(ranges, cell, moveit)
-    locked = [full.getJointId(n) for n in list(full.names)[1:] if n not in moving]
-    model = pin.buildReducedModel(full, locked, q_locked)
-    if list(model.names)[1:] != list(moving):
-        raise SceneError("robot.urdf: the joints from base to TCP are not one chain")
-    model.lowerPositionLimit = limits.lower
-    model.upperPositionLimit = limits.upper
-    return model, limits
-
-
-def _add_tcp(model: Any, spec: RobotSpec) -> Any:
-    parent_id = _frame_id(model, spec.tcp.parent, "robot.tcp.parent")
-    parent = model.frames[parent_id]
-    placement = parent.placement * pin.SE3(spec.tcp.matrix())
-    frame = pin.Frame(
-        TCP_FRAME, parent.parentJoint, parent_id, placement, pin.FrameType.OP_FRAME
-    )
-    return model.frames[model.addFrame(frame)]
