@@ -2,28 +2,27 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from collections.abc import Collection, Mapping
 from typing import Any
 
+from reachmap.cell.urdf import UrdfDescription
 from reachmap.cell.yaml_text import Document, parse_yaml
+from reachmap.errors import CellError
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class MoveItLimits:
-    """Limits of one joint; None where the file sets none.
-
-    Velocities in rad/s or m/s, accelerations in rad/s² or m/s², positions in rad
-    or m.
-    """
-
-    velocity: float | None = None
-    acceleration: float | None = None
-    lower: float | None = None
-    upper: float | None = None
+MoveItLimits = dict[str, float | bool]
+_RATES = (("velocity_rad_s", "velocity"), ("acceleration_rad_s2", "acceleration"))
+_LARGEST = 1e6
 
 
 def parse_joint_limits(text: str, source: str) -> dict[str, MoveItLimits]:
-    """Read the ``has_*_limits`` / ``max_*`` pairs of a MoveIt file.
+    """Read a MoveIt file.
+
+    Returns
+    -------
+    dict
+        Joint name to its ``has_*_limits`` and ``max_*``/``min_*`` entries, with
+        only the limits that are switched on [rad/s, rad/s², rad; m for prismatic].
 
     Raises
     ------
@@ -32,13 +31,11 @@ def parse_joint_limits(text: str, source: str) -> dict[str, MoveItLimits]:
     """
     document = parse_yaml(text, source)
     data = document.data
-    if not isinstance(data, dict) or not isinstance(data.get("joint_limits"), dict):
-        document.add((), "expected a mapping joint_limits: {joint: {...}}")
-        document.raise_mistakes()
-    limits = {
-        name: _one(document, name, entry)
-        for name, entry in data["joint_limits"].items()
-    }
+    table = data.get("joint_limits") if isinstance(data, dict) else None
+    if not isinstance(table, dict):
+        place = document.place(())
+        raise CellError(f"{place}: expected a mapping joint_limits: {{joint: {{…}}}}")
+    limits = {name: _one(document, name, entry) for name, entry in table.items()}
     document.raise_mistakes()
     return limits
 
@@ -47,28 +44,75 @@ def _one(document: Document, name: str, entry: Any) -> MoveItLimits:
     location = ("joint_limits", name)
     if not isinstance(entry, dict):
         document.add(location, "expected a mapping")
-        return MoveItLimits()
-
-    def number(flag: str, key: str, *, positive: bool) -> float | None:
+        return {}
+    limits: MoveItLimits = {}
+    for kind, keys in (
+        ("velocity", ("max_velocity",)),
+        ("acceleration", ("max_acceleration",)),
+        ("position", ("min_position", "max_position")),
+    ):
+        flag = f"has_{kind}_limits"
         if entry.get(flag) is not True:
-            return None
-        value: Any = entry.get(key)
-        fine = isinstance(value, int | float) and not isinstance(value, bool)
-        if not fine or not abs(value) < 1e6 or (positive and value <= 0):
-            wanted = "a positive finite number" if positive else "a finite number"
-            document.add((*location, key), f"expected {wanted} (got {value!r:.60})")
-            return None
-        return float(value)
-
-    limits = MoveItLimits(
-        velocity=number("has_velocity_limits", "max_velocity", positive=True),
-        acceleration=number(
-            "has_acceleration_limits", "max_acceleration", positive=True
-        ),
-        lower=number("has_position_limits", "min_position", positive=False),
-        upper=number("has_position_limits", "max_position", positive=False),
-    )
-    lower, upper = limits.lower, limits.upper
-    if lower is not None and upper is not None and lower >= upper:
+            limits[flag] = False
+            continue
+        for key in keys:
+            value = _number(entry.get(key), positive=kind != "position")
+            if value is None:
+                wanted = "a finite number" + (" > 0" if kind != "position" else "")
+                message = f"expected {wanted} (got {entry.get(key)!r:.60})"
+                document.add((*location, key), message)
+            else:
+                limits[flag] = True
+                limits[key] = value
+    low, high = limits.get("min_position"), limits.get("max_position")
+    if low is not None and high is not None and low >= high:
         document.add(location, "min_position must be below max_position")
     return limits
+
+
+def _number(value: Any, *, positive: bool) -> float | None:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return None
+    fine = abs(value) < _LARGEST and (value > 0 or not positive)
+    return float(value) if fine else None
+
+
+def tighten_limits(
+    limits: dict[str, Any],
+    table: Mapping[str, MoveItLimits],
+    robot: UrdfDescription,
+    moving: Collection[str],
+) -> None:
+    """Write the limits of a MoveIt file into ``robot.limits``; the tightest wins.
+
+    Parameters
+    ----------
+    limits : dict
+        ``robot.limits`` of the cell as plain data, changed in place.
+    table : mapping
+        As read by :func:`parse_joint_limits`; joints that do not move are left out.
+    """
+    for key, kind in _RATES:
+        found = {
+            joint: float(table[joint][f"max_{kind}"])
+            for joint in moving
+            if f"max_{kind}" in table.get(joint, {})
+        }
+        given = limits[key]
+        if found and isinstance(given, float):
+            given = dict.fromkeys(moving, given)
+        for joint, value in found.items():
+            given = {
+                **(given or {}),
+                joint: min(value, (given or {}).get(joint, value)),
+            }
+        limits[key] = given
+    for joint in moving:
+        file = table.get(joint, {})
+        if "min_position" not in file or "max_position" not in file:
+            continue
+        turn = robot.joints[joint].type != "prismatic"
+        pair = [float(file["min_position"]), float(file["max_position"])]
+        low, high = (math.degrees(v) for v in pair) if turn else pair
+        own = limits["position_deg"].get(joint, [low, high])
+        limits["position_deg"][joint] = [max(low, own[0]), min(high, own[1])]

@@ -53,7 +53,7 @@ class LoadedCell:
     mesh_paths : mapping
         The same keys to absolute paths.
     joint_limits : mapping
-        Joint to :class:`MoveItLimits`, as read; already merged into ``cell``.
+        MoveIt's ``joint_limits`` as read; they are also merged into ``cell``.
     warnings : tuple of str
         Things that are allowed but doubtful.
     """

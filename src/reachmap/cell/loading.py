@@ -3,27 +3,19 @@
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
-
-from pydantic import ValidationError
+from typing import NamedTuple
 
 from reachmap.cell.doubts import find_doubts
-from reachmap.cell.files import (
-    CellFiles,
-    compare_hashes,
-    read_files,
-    stored_files,
-)
+from reachmap.cell.files import compare_hashes, read_files, stored_files
 from reachmap.cell.loaded import LoadedCell, fingerprint
-from reachmap.cell.messages import add_validation_errors
 from reachmap.cell.model import Cell
 from reachmap.cell.model_paths import did_you_mean
 from reachmap.cell.overrides import apply_overrides
 from reachmap.cell.references import check_names
-from reachmap.cell.resources import SCHEME, SHIPPED, Resolver, shipped_folder
+from reachmap.cell.resolution import resolved_cell, validated
+from reachmap.cell.resources import shipped_folder
 from reachmap.cell.yaml_text import (
     MAX_TEXT_BYTES,
     Document,
@@ -33,7 +25,14 @@ from reachmap.cell.yaml_text import (
 )
 from reachmap.errors import CellError
 
-__all__ = ["LoadedCell", "cell_from_json", "read_cell", "shipped_cells"]
+__all__ = [
+    "LoadedCell",
+    "cell_from_json",
+    "cell_from_text",
+    "read_cell",
+    "shipped_cells",
+    "stored_cell",
+]
 
 SUFFIXES = (".yaml", ".yml")
 MAX_JSON_BYTES = 4_000_000
@@ -92,7 +91,7 @@ def cell_from_text(
     if not isinstance(document.data, dict):
         raise CellError(f"{label}:1:1: expected a mapping with format: reachmap.cell")
     apply_overrides(document, overrides, Cell)
-    cell = _validated(document)
+    cell = validated(document)
     files = read_files(document, directory)
     if files.robot is not None:
         check_names(document, files.robot, files.srdf_description)
@@ -100,7 +99,7 @@ def cell_from_text(
     document.raise_mistakes()
     if cell is None or files.robot is None:
         raise CellError(f"{label}: cannot be loaded")
-    resolved = _resolved(document, cell, files, directory)
+    resolved = resolved_cell(document, cell, files, directory)
     return LoadedCell(
         cell=resolved,
         source=source or label,
@@ -135,100 +134,6 @@ def _find(name_or_path: str) -> Path:
     raise CellError(f"{name_or_path!r:.120} is no shipped cell and no file; {hint}")
 
 
-def _validated(document: Document) -> Cell | None:
-    """Validate the document's data; None, with mistakes added, if it is wrong."""
-    try:
-        # Strict, and through JSON: quoted numbers and booleans in number fields are
-        # mistakes, while lists may still become tuples.
-        return Cell.model_validate_json(json.dumps(document.data), strict=True)
-    except ValidationError as error:
-        add_validation_errors(document, error, Cell)
-    except (ValueError, OverflowError, RecursionError) as error:
-        document.add((), f"cannot be read: {error}")
-    return None
-
-
-def _resolved(
-    document: Document, cell: Cell, files: CellFiles, directory: Path
-) -> Cell:
-    """Write out SRDF names and MoveIt limits, and make paths absolute."""
-    data = cell.model_dump(mode="json")
-    robot = data["robot"]
-    resolver = files.resolver
-    data["resources"]["packages"] = {
-        name: str((directory / folder).absolute())
-        for name, folder in data["resources"]["packages"].items()
-    }
-    for key in ("urdf", "srdf", "joint_limits"):
-        if robot[key]:
-            robot[key] = _portable(robot[key], resolver)
-    for body in data["bodies"]:
-        if body["shape"]["mesh"]:
-            mesh = body["shape"]["mesh"]
-            mesh["file"] = _portable(mesh["file"], resolver)
-    _write_out_srdf(document, data, files)
-    _merge_limits(robot["limits"], files)
-    try:
-        return Cell.model_validate_json(json.dumps(data), strict=True)
-    except ValidationError as error:
-        add_validation_errors(document, error, Cell)
-        document.raise_mistakes()
-        raise
-
-
-def _portable(reference: str, resolver: Resolver) -> str:
-    """Make a reference usable from another folder: package:// or absolute."""
-    if reference.startswith(SCHEME):
-        return reference
-    path = resolver.resolve(reference)
-    shipped = shipped_folder()
-    if path.is_relative_to(shipped):
-        return f"{SCHEME}{SHIPPED}/{path.relative_to(shipped).as_posix()}"
-    return str(path)
-
-
-def _write_out_srdf(document: Document, data: dict[str, Any], files: CellFiles) -> None:
-    """Replace group and group_state by the joints and positions they stand for."""
-    srdf, robot = files.srdf_description, files.robot
-    if srdf is None or robot is None:
-        return
-    cell_robot = data["robot"]
-    if cell_robot["group"] is not None:
-        locked = cell_robot["locked_joints_deg"]
-        names = [n for n in srdf.groups[cell_robot["group"]] if n not in locked]
-        if not names:
-            document.add(("robot", "group"), "the group has no joint that moves")
-        cell_robot["joints"] = cell_robot["joints"] or names
-        cell_robot["group"] = None
-    state = data["scan_configuration"]["group_state"]
-    if state is not None:
-        data["scan_configuration"] = {"q_rad": srdf.states[state]}
-    document.raise_mistakes()
-
-
-def _merge_limits(limits: dict[str, Any], files: CellFiles) -> None:
-    """Add the limits of the MoveIt file where the cell itself sets none."""
-    for key, name in (
-        ("velocity_rad_s", "velocity"),
-        ("acceleration_rad_s2", "acceleration"),
-    ):
-        if isinstance(limits[key], float):
-            continue
-        found = {
-            joint: value
-            for joint, limit in files.joint_limits.items()
-            if (value := getattr(limit, name)) is not None
-        }
-        limits[key] = {**found, **(limits[key] or {})} or None
-    joints = {} if files.robot is None else files.robot.joints
-    for joint, limit in files.joint_limits.items():
-        if limit.lower is None or limit.upper is None or joint not in joints:
-            continue
-        turn = joints[joint].type != "prismatic"
-        pair = [math.degrees(v) if turn else v for v in (limit.lower, limit.upper)]
-        limits["position_deg"].setdefault(joint, pair)
-
-
 def cell_from_json(
     resolved_json: str,
     *,
@@ -260,20 +165,7 @@ def cell_from_json(
     CellError
         The JSON is no cell, or a mesh is missing or has changed.
     """
-    document = Document(source=source)
-    document.places[()] = Place(source=source)
-    if len(resolved_json) > MAX_JSON_BYTES:
-        raise CellError(f"{source}: the cell is larger than {MAX_JSON_BYTES:,} bytes")
-    try:
-        document.data = json.loads(resolved_json)
-    except (ValueError, RecursionError) as error:
-        raise CellError(f"{source}: the cell is not JSON: {error}") from None
-    if not isinstance(document.data, dict):
-        raise CellError(f"{source}: the cell is not a JSON object")
-    cell = _validated(document)
-    document.raise_mistakes()
-    if cell is None:
-        raise CellError(f"{source}: cannot be loaded")
+    document, cell = stored_cell(resolved_json, source=source)
     files = stored_files(document, urdf=urdf, srdf=srdf)
     if files.robot is not None:
         check_names(document, files.robot, files.srdf_description)
@@ -292,3 +184,35 @@ def cell_from_json(
         files_sha256=files.files_sha256,
         mesh_paths=files.mesh_paths,
     )
+
+
+class StoredCell(NamedTuple):
+    """A cell as an artefact keeps it, before any file is looked for."""
+
+    document: Document
+    cell: Cell
+
+
+def stored_cell(resolved_json: str, *, source: str = "artefact") -> StoredCell:
+    """Validate the ``cell_resolved_json`` of an artefact; needs no other file.
+
+    Raises
+    ------
+    CellError
+        The JSON is no cell.
+    """
+    document = Document(source=source)
+    document.places[()] = Place(source=source)
+    if len(resolved_json) > MAX_JSON_BYTES:
+        raise CellError(f"{source}: the cell is larger than {MAX_JSON_BYTES:,} bytes")
+    try:
+        document.data = json.loads(resolved_json)
+    except (ValueError, RecursionError) as error:
+        raise CellError(f"{source}: the cell is not JSON: {error}") from None
+    if not isinstance(document.data, dict):
+        raise CellError(f"{source}: the cell is not a JSON object")
+    cell = validated(document)
+    document.raise_mistakes()
+    if cell is None:
+        raise CellError(f"{source}: cannot be loaded")
+    return StoredCell(document, cell)

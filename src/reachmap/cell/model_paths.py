@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import types
+from collections.abc import Collection
 from typing import Annotated, Any, Union, get_args, get_origin
 
 from pydantic import BaseModel
@@ -28,10 +29,11 @@ def known_keys(model: type[BaseModel], location: Location) -> tuple[str, ...]:
     return tuple(dict.fromkeys(keys))
 
 
-def did_you_mean(word: str, choices: tuple[str, ...] | list[str]) -> str:
+def did_you_mean(word: str, choices: Collection[str]) -> str:
     """Sentence that names the nearest choice, or all of them."""
     if not choices:
         return ""
+    choices = list(choices)
     near = difflib.get_close_matches(word, choices, n=1, cutoff=0.5)
     if near:
         return f"did you mean {near[0]!r}?"

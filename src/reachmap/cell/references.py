@@ -6,6 +6,7 @@ mesh is reported together with a misspelt key.
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import Any
 
 from reachmap.cell.model_paths import did_you_mean
@@ -136,17 +137,22 @@ def _check_joints(
                 ("robot", "joints", index),
                 f"joint {name!r} ({kind}) cannot be planned for",
             )
-    for location in (
-        ("robot", "locked_joints_deg"),
-        ("robot", "limits", "velocity_rad_s"),
-        ("robot", "limits", "acceleration_rad_s2"),
-        ("robot", "limits", "position_deg"),
-    ):
+    tables: list[tuple[Location, Collection[str] | None]] = [
+        (("robot", "locked_joints_deg"), every),
+        (("robot", "limits", "velocity_rad_s"), moving),
+        (("robot", "limits", "acceleration_rad_s2"), moving),
+        (("robot", "limits", "position_deg"), moving),
+    ]
+    for location, known in tables:
         table = at(data, *location)
-        for name in table if isinstance(table, dict) else ():
-            if name not in every:
-                hint = did_you_mean(name, every)
-                document.add((*location, name), f"no moving joint; {hint}", of_key=True)
+        if known is None or not isinstance(table, dict):
+            continue
+        for name in table:
+            if name not in known:
+                hint = did_you_mean(name, known)
+                document.add(
+                    (*location, name), f"not a joint that moves; {hint}", of_key=True
+                )
     if moving is None:
         return
     redundant = text_at(data, "robot", "ik", "redundant_joint")
