@@ -70,7 +70,7 @@ class Scene:
         return cls(
             loaded=loaded,
             robot=robot,
-            kinematics=Kinematics.from_cell(robot, loaded.cell.robot.ik),
+            kinematics=Kinematics(robot),
             checker=checker,
             motions=motions,
             planner=Planner(motions, robot.lower_rad, robot.upper_rad, cell.planner),
