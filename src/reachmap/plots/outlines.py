@@ -18,7 +18,7 @@ from reachmap.cell.model import BinSpec, Cell
 from reachmap.geometry import inverse_transform
 from reachmap.plots.style import BIN_COLOUR, INK
 
-Kind: TypeAlias = Literal["base", "body", "bin", "runner-up"]
+Kind: TypeAlias = Literal["base", "body", "bin", "runner-up", "paper", "camera"]
 ROUND_STEPS = 48
 
 LOOKS: dict[str, dict[str, Any]] = {
@@ -27,8 +27,18 @@ LOOKS: dict[str, dict[str, Any]] = {
     "bin": {"edgecolor": BIN_COLOUR, "linewidth": 1.8},
     "runner-up": {
         "edgecolor": BIN_COLOUR,
+        "linewidth": 1.5,
+        "linestyle": (0, (4, 1.5)),
+    },
+    "camera": {
+        "edgecolor": "#5f5f5f",
         "linewidth": 1.4,
-        "linestyle": (0, (1.2, 1.6)),
+        "linestyle": (0, (6, 2, 1, 2)),
+    },
+    "paper": {
+        "edgecolor": "#7b1fa2",
+        "linewidth": 1.5,
+        "linestyle": (0, (1.2, 1.4)),
     },
 }
 

@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
 from matplotlib.collections import QuadMesh
 from matplotlib.colorbar import Colorbar
 from matplotlib.colors import Colormap, Normalize
@@ -156,7 +157,7 @@ def axis_titles(axes: Axes, frame: str = "robot_base") -> None:
 
 def colour_bar(
     figure: Figure,
-    mesh: QuadMesh,
+    mesh: ScalarMappable,
     box_in: tuple[float, float, float, float],
     label: str,
     *,

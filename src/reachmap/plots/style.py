@@ -112,14 +112,18 @@ def put_title(figure: Figure, left: float, title: str, subtitle: str = "") -> No
         (height - 0.60, subtitle, {"fontsize": SUBTITLE_SIZE, "color": MUTED}),
     )
     for bottom, text, how in lines:
-        _fit_width(figure, left, put_text(figure, left, bottom, text, **how))
+        fit_width(figure, left, put_text(figure, left, bottom, text, **how))
 
 
-def _fit_width(figure: Figure, left: float, text: Text) -> None:
+def fit_width(figure: Figure, left: float, text: Text) -> None:
+    """Set a text smaller if it runs out of the figure; it starts at ``left`` [in]."""
     room = float(figure.get_size_inches()[0]) - left - 0.15
-    taken = text.get_window_extent().width / figure.dpi
-    if taken > room:
-        text.set_fontsize(float(text.get_fontsize()) * room / taken)
+    # Glyphs are hinted, so the width is not quite proportional to the size.
+    while (taken := text.get_window_extent().width / figure.dpi) > room:
+        size = float(text.get_fontsize())
+        if size < SMALLEST_NUMBER:
+            return
+        text.set_fontsize(size * min(0.98, room / taken))
 
 
 def colour_map(name: str) -> Colormap:

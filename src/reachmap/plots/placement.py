@@ -1,0 +1,342 @@
+"""The bin placement from above: the bin on its level, and every place considered."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import PathCollection
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patheffects import withStroke
+
+from reachmap._typing import FloatArray
+from reachmap.geometry import yaw_transform
+from reachmap.maps.records import BinPlacement, WorkspaceMap
+from reachmap.plots.context import CellContext, context_of
+from reachmap.plots.heatmap import draw_level_on
+from reachmap.plots.outlines import (
+    Kind,
+    Outline,
+    bin_outlines,
+    draw_outline,
+    legend_lines,
+)
+from reachmap.plots.squares import MINUS, PERCENT_SCALE, axis_titles, colour_bar
+from reachmap.plots.stack import LevelStack, height_text
+from reachmap.plots.style import (
+    BIN_COLOUR,
+    INK,
+    MUTED,
+    PercentMap,
+    axes_at,
+    colour_map,
+    drawing,
+    fit_width,
+    new_figure,
+    put_text,
+    put_title,
+)
+
+LEFT, RIGHT, TOP, GAP = 0.80, 0.95, 1.05, 0.75
+BOTTOM = 2.0
+WIDEST, TALLEST = 5.6, 6.2
+LINE = 0.19
+REASONS_SHOWN = 4
+
+
+@drawing()
+def draw_placement(
+    placement: BinPlacement,
+    workspace: WorkspaceMap | None = None,
+    *,
+    camera_view: FloatArray | None = None,
+    percent_map: PercentMap = "RdYlGn",
+) -> Figure:
+    """Draw where the bin goes, on the map it was chosen from, and the alternatives.
+
+    Parameters
+    ----------
+    placement : BinPlacement
+    workspace : WorkspaceMap, optional
+        The map it was chosen from; without it the bin stands on an empty level.
+    camera_view : array, shape (n, 2), optional
+        What the camera sees from the scan configuration on the height of the rim, in
+        robot_base [m].
+    percent_map : str
+    """
+    context = context_of(placement.provenance)
+    stack = _stack(placement, workspace, context)
+    low, high = _view(placement, stack)
+    scale_in = min(WIDEST / (high[0] - low[0]), TALLEST / (high[1] - low[1]))
+    width, height = (high - low) * scale_in
+    count = 1 if workspace is None else 2
+    bottom = BOTTOM if count == 2 else BOTTOM + 0.95
+    figure = new_figure(
+        LEFT + count * (width + GAP) - GAP + RIGHT, bottom + height + TOP
+    )
+    panels = [
+        axes_at(figure, LEFT + column * (width + GAP), bottom, width, height)
+        for column in range(count)
+    ]
+    level = int(np.abs(stack.z - placement.bin_pose[2, 3]).argmin())
+    if workspace is not None:
+        draw_level_on(panels[0], stack, level, scale_in, percent_map)
+        said = f"on the map of path reachability, level {height_text(stack, level)}"
+        panels[0].set_title(said, loc="left")
+    marks = _draw_candidates(panels[-1], placement, scale_in, percent_map)
+    panels[-1].set_title("best score at each place, over z and yaw", loc="left")
+    for outline in stack.shown(level):
+        draw_outline(panels[-1], outline)
+    handles = _draw_bins(panels[0], placement, context, camera_view)
+    for axes in panels:
+        axes.set_xlim(low[0], high[0])
+        axes.set_ylim(low[1], high[1])
+        axes.set_aspect("equal")
+        axes.tick_params(length=2.5)
+        axis_titles(axes)
+    left = LEFT + (count - 1) * (width + GAP)
+    bar = (left + width + 0.15, bottom, 0.16, height)
+    colour_bar(figure, marks, bar, "Path reachability, score [%]")
+    _put_legend(figure, [*handles, *legend_lines(stack.shown(level))], bottom - 0.55)
+    _put_words(figure, placement, left, bottom - (0.75 if count == 2 else 1.70))
+    title, subtitle = placement_words(placement)
+    put_title(figure, LEFT, title, f"{subtitle} · {context.name}".rstrip(" ·"))
+    return figure
+
+
+def placement_words(placement: BinPlacement) -> tuple[str, str]:
+    """Title and subtitle: where the bin goes, and its score."""
+    x, y, z = placement.bin_pose[:3, 3]
+    yaw = np.degrees(np.arctan2(placement.bin_pose[1, 0], placement.bin_pose[0, 0]))
+    title = (
+        f"Bin at x = {_length(x)}, y = {_length(y)}, z = {_length(z)} m, "
+        f"yaw {round(float(yaw)) + 0:d}°"
+    )
+    parts = [
+        f"score {placement.score[placement.chosen]:.1f} %",
+        f"worst point {placement.worst_point[placement.chosen]:.0f} %",
+    ]
+    if placement.runner_up >= 0:
+        parts.append(f"runner-up {placement.score[placement.runner_up]:.1f} %")
+    if placement.paper_choice >= 0:
+        score = placement.score[placement.paper_choice]
+        said = "excluded" if np.isnan(score) else f"{score:.1f} %"
+        parts.append(f"the paper's rule {said}")
+    return title.replace("-", MINUS), " · ".join(parts)
+
+
+def _length(value: float) -> str:
+    return f"{round(float(value), 3) + 0.0:+.3f}"
+
+
+def _stack(
+    placement: BinPlacement, workspace: WorkspaceMap | None, context: CellContext
+) -> LevelStack:
+    if workspace is None:
+        return LevelStack(
+            x=_ends(placement.candidate_pose[:, 0]),
+            y=_ends(placement.candidate_pose[:, 1]),
+            z=placement.bin_pose[2:3, 3],
+            values=np.full((1, 2, 2), np.nan),
+            quantity="path",
+            outlines=context.standing,
+        )
+    return LevelStack(
+        x=workspace.x,
+        y=workspace.y,
+        z=workspace.z,
+        values=workspace.path_reachability,
+        quantity="path",
+        outlines=context.standing,
+        cell_name=context.name,
+    )
+
+
+def _ends(values: FloatArray) -> FloatArray:
+    """Two rising numbers that span the values."""
+    low, high = float(values.min()), float(values.max())
+    return np.array([low, max(high, low + 0.1)])
+
+
+def _view(placement: BinPlacement, stack: LevelStack) -> tuple[FloatArray, FloatArray]:
+    """Corners that hold the map, what stands there, and every place considered."""
+    places = placement.candidate_pose[:, :2]
+    points = [places - 0.1, places + 0.1]
+    for outline in stack.outlines:
+        if outline.kind == "base":
+            points += [outline.polygon - 0.07, outline.polygon + 0.07]
+    if not np.isnan(stack.values).all():
+        points.append(stack.view())
+    everything = np.concatenate(points)
+    return everything.min(axis=0), everything.max(axis=0)
+
+
+def _draw_bins(
+    axes: Axes,
+    placement: BinPlacement,
+    context: CellContext,
+    camera_view: FloatArray | None,
+) -> list[Line2D]:
+    """Draw the bins and what the camera sees; return their legend."""
+    outlines = _bins(placement, context)
+    if camera_view is not None:
+        z = float(placement.bin_pose[2, 3])
+        outlines.append(
+            Outline(
+                name="camera view",
+                kind="camera",
+                polygon=camera_view,
+                z_low=z,
+                z_high=z,
+            )
+        )
+    for outline in outlines:
+        draw_outline(axes, outline)
+    _draw_bin_axis(axes, placement)
+    return legend_lines(outlines)
+
+
+def _bins(placement: BinPlacement, context: CellContext) -> list[Outline]:
+    """Outlines of the paper's choice, the runner-up and the chosen bin, in order."""
+    if context.cell is None:
+        return []
+    spec = context.cell.bin
+    outlines: list[Outline] = []
+    others: tuple[tuple[int, str, Kind], ...] = (
+        (placement.paper_choice, "the paper's rule", "paper"),
+        (placement.runner_up, "runner-up", "runner-up"),
+    )
+    for index, name, kind in others:
+        if index < 0 or index == placement.chosen:
+            continue
+        T = yaw_transform(*(float(v) for v in placement.candidate_pose[index]))
+        outlines.append(bin_outlines(spec, T, name=name, kind=kind)[0])
+    outlines += bin_outlines(
+        spec, placement.bin_pose, name="chosen bin (arrow: its x axis)"
+    )
+    return outlines
+
+
+def _draw_bin_axis(axes: Axes, placement: BinPlacement) -> None:
+    """Arrow along the bin's x axis from its centre."""
+    centre = placement.bin_pose[:2, 3]
+    tip = centre + 0.10 * placement.bin_pose[:2, 0]
+    axes.annotate(
+        "",
+        xy=(float(tip[0]), float(tip[1])),
+        xytext=(float(centre[0]), float(centre[1])),
+        arrowprops={
+            "arrowstyle": "-|>",
+            "color": BIN_COLOUR,
+            "linewidth": 1.6,
+            "shrinkA": 0,
+            "shrinkB": 0,
+            "path_effects": [withStroke(linewidth=3.4, foreground="white")],
+        },
+        zorder=5,
+    )
+
+
+def _draw_candidates(
+    axes: Axes, placement: BinPlacement, scale_in: float, percent_map: PercentMap
+) -> PathCollection:
+    """Mark each place (x, y) with the best score over the rest of its poses."""
+    places, group = np.unique(
+        placement.candidate_pose[:, :2].round(3), axis=0, return_inverse=True
+    )
+    best = np.full(len(places), -1.0)
+    np.maximum.at(best, group.ravel(), np.nan_to_num(placement.score, nan=-1.0))
+    out = best < 0.0
+    axes.plot(
+        places[out, 0],
+        places[out, 1],
+        "x",
+        color="#8c8c8c",
+        markersize=3.5,
+        markeredgewidth=0.9,
+        zorder=2,
+    )
+    marks = axes.scatter(
+        places[~out, 0],
+        places[~out, 1],
+        c=best[~out],
+        s=_mark_size(places) ** 2 * (scale_in * 72.0) ** 2,
+        marker="s",
+        cmap=colour_map(percent_map),
+        norm=PERCENT_SCALE,
+        linewidths=0,
+        zorder=3,
+    )
+    x, y = placement.bin_pose[:2, 3]
+    for colour, line in (("white", 4.5), (BIN_COLOUR, 2.2)):
+        axes.plot(
+            [x],
+            [y],
+            "o",
+            color=colour,
+            markeredgewidth=line,
+            fillstyle="none",
+            markersize=10,
+            zorder=5,
+        )
+    return marks
+
+
+def _mark_size(places: FloatArray) -> float:
+    """Side of a mark that nearly fills the spacing of places [m]."""
+    steps = [np.diff(np.unique(places[:, axis].round(3))) for axis in (0, 1)]
+    # Refined candidates lie between those of the grid: the usual step counts.
+    usual = [float(np.median(step)) for step in steps if step.size]
+    return 0.86 * float(np.clip(min(usual, default=0.05), 0.015, 0.10))
+
+
+def _put_legend(figure: Figure, handles: list[Line2D], top: float) -> None:
+    figure.legend(
+        handles=handles,
+        loc="upper left",
+        bbox_to_anchor=(
+            (LEFT - 0.08) / figure.get_figwidth(),
+            top / figure.get_figheight(),
+        ),
+        ncols=2,
+        columnspacing=1.6,
+        handlelength=2.2,
+    )
+
+
+def _put_words(
+    figure: Figure, placement: BinPlacement, left: float, top: float
+) -> None:
+    """Write the margins, and why places are out of the question, from (left, top)."""
+    excluded = Counter(reason for reason in placement.reason if reason)
+    tested = int(np.sum(placement.exact > 0))
+    margins = _margins(placement)
+    lines = [
+        "The score stays within 5 points while the bin moves by",
+        *(f"    {line}" for line in margins),
+        f"{len(placement.reason)} poses considered, {tested} with the bin in the scene",
+    ]
+    if excluded:
+        lines[-1] += f"; {excluded.total()} excluded (×):"
+    lines += [
+        f"    {count} {reason}" for reason, count in excluded.most_common(REASONS_SHOWN)
+    ]
+    for index, line in enumerate(lines):
+        bottom = top - LINE * index
+        colour = INK if index <= len(margins) else MUTED
+        text = put_text(figure, left, bottom, line, fontsize=8.5, color=colour)
+        fit_width(figure, left, text)
+
+
+def _margins(placement: BinPlacement) -> list[str]:
+    """Margins in words, four to a line, as ``+x 40 mm, −yaw 12°``."""
+    words = []
+    for direction, value in placement.margin.items():
+        turned = "yaw" in direction
+        size = f"{np.degrees(value):.0f}°" if turned else f"{1000.0 * value:.0f} mm"
+        words.append(f"{direction} {size}".replace("-", MINUS))
+    if not words:
+        return ["(not measured)"]
+    return [", ".join(words[i : i + 4]) for i in range(0, len(words), 4)]
