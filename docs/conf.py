@@ -18,10 +18,13 @@ extensions = [
     "sphinx.ext.napoleon",
     "sphinx_click",
     "cell_fields",
+    "plain_help",
+    "plain_types",
 ]
 exclude_patterns = ["_build", "images/README.md"]
 myst_enable_extensions = ["colon_fence", "deflist", "fieldlist"]
 myst_heading_anchors = 3
+smartquotes = False  # it would turn --option into a dash
 
 # numpydoc sections; attributes as a field list, since records are documented there.
 napoleon_google_docstring = False
