@@ -139,7 +139,7 @@ class SerialChain:
         for k in np.flatnonzero(~self.is_revolute):
             steps[k] = self.T_fixed[k]
             steps[k, :, :, 3] += Q[:, k, None] * self.T_fixed[k, :, 2]
-        return steps
+        return np.asarray(steps)
 
     def _parts(self) -> FloatArray:
         """Constant, cosine and sine part of each joint, shape (3, dof, 16)."""

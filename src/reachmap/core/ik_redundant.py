@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from reachmap._typing import FloatArray
+from reachmap._typing import FloatArray, IntArray
 from reachmap.core.chain import SerialChain
 from reachmap.core.ik_analytic import MET, EaikRows, can_use_eaik
 from reachmap.core.ik_newton import ACCEPTED, matrix_difference, refine_many
@@ -85,7 +85,7 @@ class RedundantSolver:
         more = self._between_samples(raw, T, np.flatnonzero(counts == 0))
         return joined([solved, more], self._chain.dof)
 
-    def _between_samples(self, raw: Rows, T: FloatArray, missing: FloatArray) -> Rows:
+    def _between_samples(self, raw: Rows, T: FloatArray, missing: IntArray) -> Rows:
         """Solutions near the best rows of the grid, with the sampled joint free.
 
         Near the edge of reach the curves of solutions are shorter than the grid's

@@ -1,11 +1,13 @@
-"""Joint limits: URDF, MoveIt's joint_limits.yaml and the cell, the tightest wins."""
+"""Joint limits: those of the URDF and of the cell, the tightest wins.
+
+The limits of a MoveIt file are part of the cell once it is loaded.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -45,12 +47,8 @@ class JointRange:
     velocity: float
 
 
-def merge_limits(
-    joints: Sequence[JointRange],
-    cell: JointLimits,
-    moveit: Mapping[str, Any] | None = None,
-) -> LimitTable:
-    """Intersect the three sources of limits.
+def merge_limits(joints: Sequence[JointRange], cell: JointLimits) -> LimitTable:
+    """Intersect the limits of URDF and cell.
 
     Parameters
     ----------
@@ -58,23 +56,16 @@ def merge_limits(
         Limits of the URDF, in chain order.
     cell : JointLimits
         Limits of the cell; ``position_deg`` is in metres for prismatic joints.
-    moveit : mapping, optional
-        A parsed ``joint_limits.yaml``, with or without its outer
-        ``joint_limits`` key.
 
     Raises
     ------
     SceneError
         A limit is missing or empty, or names a joint that does not move.
     """
-    files = dict(moveit or {})
-    files = dict(files.get("joint_limits", files) or {})
     problems = _unknown_names(joints, cell)
-    rows = [_position(j, cell, files.get(j.name) or {}, problems) for j in joints]
-    velocity = _rates(joints, cell.velocity_rad_s, files, "velocity", problems)
-    acceleration = _rates(
-        joints, cell.acceleration_rad_s2, files, "acceleration", problems
-    )
+    rows = [_position(j, cell, problems) for j in joints]
+    velocity = _rates(joints, cell.velocity_rad_s, "velocity", problems)
+    acceleration = _rates(joints, cell.acceleration_rad_s2, "acceleration", problems)
     if problems:
         raise SceneError(problems)
     lower, upper = np.array(rows, float).reshape(-1, 2).T
@@ -101,19 +92,12 @@ def _unknown_names(joints: Sequence[JointRange], cell: JointLimits) -> list[str]
 
 
 def _position(
-    joint: JointRange, cell: JointLimits, file: Mapping[str, Any], problems: list[str]
+    joint: JointRange, cell: JointLimits, problems: list[str]
 ) -> tuple[float, float]:
     turns = joint.kind != "prismatic"
     bounds = []
     if joint.kind != "continuous":
         bounds.append((joint.lower, joint.upper))
-    if file.get("has_position_limits") or "min_position" in file:
-        bounds.append(
-            (
-                float(file.get("min_position", -math.inf)),
-                float(file.get("max_position", math.inf)),
-            )
-        )
     if joint.name in cell.position_deg:
         low, high = cell.position_deg[joint.name]
         factor = math.pi / 180 if turns else 1.0
@@ -133,16 +117,12 @@ def _position(
 def _rates(
     joints: Sequence[JointRange],
     given: float | Mapping[str, float] | None,
-    files: Mapping[str, Any],
     what: str,
     problems: list[str],
 ) -> FloatArray:
     values, missing = [], []
     for joint in joints:
         candidates = [joint.velocity] if what == "velocity" else []
-        file = files.get(joint.name) or {}
-        if file.get(f"has_{what}_limits", True):
-            candidates.append(float(file.get(f"max_{what}", 0.0)))
         if isinstance(given, Mapping):
             candidates.append(given.get(joint.name, 0.0))
         elif given is not None:

@@ -109,9 +109,7 @@ class RobotModel:
         return cls.from_spec(
             loaded.cell.robot,
             urdf=loaded.urdf_for_engine,
-            srdf=loaded.srdf,
-            package_dirs=[str(folder) for folder in loaded.package_dirs],
-            moveit_limits=loaded.joint_limits,
+            package_dirs=loaded.package_dirs,
         )
 
     @classmethod
@@ -120,31 +118,34 @@ class RobotModel:
         spec: RobotSpec,
         *,
         urdf: str,
-        srdf: str = "",
         package_dirs: Sequence[str] = (),
-        moveit_limits: Mapping[str, Any] | None = None,
     ) -> RobotModel:
-        """Build an arm from its description and the texts of its files.
+        """Build an arm from its description and its URDF.
 
         Parameters
         ----------
         spec : RobotSpec
-        urdf, srdf : str
-            Texts, xacro already expanded.
+            With ``group`` and ``joint_limits`` written out, as in a loaded cell.
+        urdf : str
+            Text, xacro already expanded.
         package_dirs : sequence of str
-        moveit_limits : mapping, optional
-            A parsed ``joint_limits.yaml``.
+            Folders in which ``package://`` names are looked up.
+
+        Raises
+        ------
+        SceneError
+            See `from_cell`.
         """
         description = read_urdf_joints(urdf)
         full = model_from_text(description.text)
         chain = BaseToTip.between(full, spec.base_frame, spec.tcp.parent)
-        moving = moving_joints(full, spec, srdf, chain.joints)
+        moving = moving_joints(full, spec, chain.joints)
         q_locked = locked_positions(full, spec, description, moving)
-        model, limits = reduced_model(
-            full, moving, q_locked, description, spec.limits, moveit_limits
-        )
+        model, limits = reduced_model(full, moving, q_locked, description, spec.limits)
         tcp = add_tcp(model, spec)
-        root_base = model.frames[model.getFrameId(chain.base)].placement
+        root_base = model.frames[
+            find_frame(model, chain.base, "robot.base_frame")
+        ].placement
         return cls(
             model=model,
             urdf=description.text,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,7 +13,7 @@ import pinocchio as pin
 from reachmap._typing import FloatArray
 from reachmap.cell.model import JointLimits, RobotSpec
 from reachmap.core.limits import JointRange, LimitTable, merge_limits
-from reachmap.core.urdf import UrdfJoints, read_group
+from reachmap.core.urdf import UrdfJoints
 from reachmap.errors import SceneError
 
 TCP_FRAME = "reachmap_tcp"
@@ -75,19 +75,12 @@ def find_frame(model: Any, name: str, where: str) -> int:
     return int(model.getFrameId(name))
 
 
-def moving_joints(
-    model: Any, spec: RobotSpec, srdf: str, chain: Sequence[str]
-) -> list[str]:
+def moving_joints(model: Any, spec: RobotSpec, chain: Sequence[str]) -> list[str]:
     """Joints that move, in chain order."""
-    if spec.joints is not None:
-        where, wanted = "robot.joints", spec.joints
-    elif spec.group is not None:
-        where, wanted = "robot.group", _group_members(model, spec.group, srdf)
-    else:
-        where, wanted = "robot.joints", chain
+    wanted = chain if spec.joints is None else spec.joints
     locked = spec.locked_joints_deg
     problems = [
-        f"{where}: joint {name!r} does not move the TCP (joints: {', '.join(chain)})"
+        f"robot.joints: {name!r} does not move the TCP (joints: {', '.join(chain)})"
         for name in wanted
         if name not in chain
     ]
@@ -105,30 +98,26 @@ def moving_joints(
     ]
     moving = [name for name in chain if name in wanted and name not in locked]
     if not moving:
-        problems.append(f"{where}: no joint is left that moves")
+        problems.append("robot.joints: no joint is left that moves")
     if problems:
         raise SceneError(problems)
     return moving
-
-
-def _group_members(model: Any, group: str, srdf: str) -> tuple[str, ...]:
-    joints, ends = read_group(srdf, group)
-    if ends is not None:
-        joints += BaseToTip.between(model, ends[0], ends[1]).joints
-    # Groups also list fixed joints, which no model has.
-    return tuple(name for name in joints if model.existJointName(name))
 
 
 def locked_positions(
     model: Any, spec: RobotSpec, urdf: UrdfJoints, moving: Sequence[str]
 ) -> FloatArray:
     """Give the positions of the full model, (nq,); moving joints at zero [rad or m]."""
-    following = [name for name in moving if name in urdf.mimics]
+    following = [
+        name
+        for name, mimic in urdf.mimics.items()
+        if name in moving or mimic.joint in moving
+    ]
     if following:
         raise SceneError(
-            f"robot.urdf: joint(s) {', '.join(following)} follow another joint "
-            "(mimic), which is not supported between base and TCP; lock them or "
-            "give robot.joints"
+            f"robot.urdf: {', '.join(following)}: a joint that mimics one of the "
+            "joints between base and TCP is not supported; lock one of the two in "
+            "robot.locked_joints_deg"
         )
     # Zero, or the nearest position allowed: some joints (Panda's elbow) exclude it.
     q = np.clip(0.0, model.lowerPositionLimit, model.upperPositionLimit)
@@ -153,7 +142,6 @@ def reduced_model(
     q_locked: FloatArray,
     urdf: UrdfJoints,
     cell: JointLimits,
-    moveit: Mapping[str, Any] | None,
 ) -> tuple[Any, LimitTable]:
     """Lock the joints that do not move, and merge the limits of the others."""
     ranges = [
@@ -166,7 +154,7 @@ def reduced_model(
         )
         for name in moving
     ]
-    limits = merge_limits(ranges, cell, moveit)
+    limits = merge_limits(ranges, cell)
     locked = [full.getJointId(n) for n in list(full.names)[1:] if n not in moving]
     model = pin.buildReducedModel(full, locked, q_locked)
     if list(model.names)[1:] != list(moving):

@@ -12,9 +12,8 @@ import xml.etree.ElementTree as ET
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
+from reachmap.cell.urdf import MOVING, parse_xml
 from reachmap.errors import SceneError
-
-_SINGLE_AXIS = ("revolute", "continuous", "prismatic")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -55,13 +54,12 @@ def read_urdf_joints(urdf: str) -> UrdfJoints:
 
     Raises
     ------
+    CellError
+        The text is not XML.
     SceneError
-        The text is no URDF, or a joint has more than one degree of freedom.
+        It is no URDF, or a joint has more than one degree of freedom.
     """
-    try:
-        root = ET.fromstring(urdf)
-    except ET.ParseError as error:
-        raise SceneError(f"robot.urdf: not valid XML ({error})") from error
+    root = parse_xml(urdf, "robot.urdf")
     if root.tag != "robot":
         raise SceneError(f"robot.urdf: expected a <robot> element, got <{root.tag}>")
     types: dict[str, str] = {}
@@ -71,10 +69,10 @@ def read_urdf_joints(urdf: str) -> UrdfJoints:
         name, kind = joint.get("name", ""), joint.get("type", "")
         if kind == "fixed":
             continue
-        if kind not in _SINGLE_AXIS:
+        if kind not in MOVING:
             problems.append(
                 f"robot.urdf: joint {name!r} has type {kind!r}; "
-                f"only fixed, {', '.join(_SINGLE_AXIS)} joints are supported"
+                f"only fixed, {', '.join(MOVING)} joints are supported"
             )
         types[name] = kind
         mimics.update(_mimic_of(joint, name))
@@ -109,32 +107,3 @@ def _bound_if_continuous(joint: ET.Element) -> None:
         limit = ET.SubElement(joint, "limit", effort="0", velocity="0")
     limit.set("lower", repr(-math.pi))
     limit.set("upper", repr(math.pi))
-
-
-def read_group(srdf: str, group: str) -> tuple[tuple[str, ...], tuple[str, str] | None]:
-    """Joints of an SRDF group, and its chain (base link, tip link) if it has one.
-
-    Raises
-    ------
-    SceneError
-        There is no such group, or it names neither joints nor a chain.
-    """
-    try:
-        root = ET.fromstring(srdf or "<robot/>")
-    except ET.ParseError as error:
-        raise SceneError(f"robot.srdf: not valid XML ({error})") from error
-    groups = {g.get("name", ""): g for g in root.findall("group")}
-    if group not in groups:
-        raise SceneError(
-            f"robot.group: no group {group!r} in the SRDF (groups: {sorted(groups)})"
-        )
-    joints = tuple(j.get("name", "") for j in groups[group].findall("joint"))
-    chain = groups[group].find("chain")
-    if chain is not None:
-        return joints, (chain.get("base_link", ""), chain.get("tip_link", ""))
-    if not joints:
-        raise SceneError(
-            f"robot.group: group {group!r} names neither joints nor a chain; "
-            "give robot.joints instead"
-        )
-    return joints, None
