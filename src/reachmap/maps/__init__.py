@@ -1,1 +1,57 @@
-"""The artefacts: records, their HDF5 form, provenance, checksums."""
+"""The artefacts: records, their HDF5 form, provenance, checksums.
+
+A file under its final name is complete, and what is read from it was checked from its
+bytes up to what its numbers say to each other.
+"""
+
+from __future__ import annotations
+
+from reachmap.maps.bin_file import read_bin_map, write_bin_map
+from reachmap.maps.hashing import canonical_json, config_sha256
+from reachmap.maps.placement_file import read_placement, write_placement
+from reachmap.maps.provenance import RunClock, collect_provenance
+from reachmap.maps.publish import check_output, publish
+from reachmap.maps.records import (
+    NO_PAIR,
+    BinMap,
+    BinPlacement,
+    CubeMap,
+    PathStore,
+    Provenance,
+    RunInfo,
+    Stamp,
+    Status,
+    WorkspaceMap,
+)
+from reachmap.maps.stamps import read_provenance
+from reachmap.maps.stitching import workspace_map_from_cubes
+from reachmap.maps.storage import artefact_kind
+from reachmap.maps.workspace_file import read_workspace_map, write_workspace_map
+
+__all__ = [
+    "NO_PAIR",
+    "BinMap",
+    "BinPlacement",
+    "CubeMap",
+    "PathStore",
+    "Provenance",
+    "RunClock",
+    "RunInfo",
+    "Stamp",
+    "Status",
+    "WorkspaceMap",
+    "artefact_kind",
+    "canonical_json",
+    "check_output",
+    "collect_provenance",
+    "config_sha256",
+    "publish",
+    "read_bin_map",
+    "read_placement",
+    "read_provenance",
+    "read_workspace_map",
+    "workspace_map_from_cubes",
+    "write_bin_map",
+    "write_placement",
+    "write_workspace_map",
+]

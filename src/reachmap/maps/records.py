@@ -109,7 +109,7 @@ class CubeMap:
         TCP orientation of each test frame in robot_base.
     status : uint8 array, shape (nz, ny, nx, no)
         :class:`Status` codes.
-    blocking_pair : int16 array, same shape
+    blocking_pair : int32 array, same shape
         Index into ``body_pairs``, -1 where there is none.
     n_ik, n_ik_free, attempts, paths_found : uint8 array, same shape
     component : int32 array, same shape
@@ -137,8 +137,8 @@ class CubeMap:
     def __post_init__(self) -> None:
         freeze(self)
 
-    def percent(self, kind: str) -> FloatArray:
-        """Eq. (1): share of frames per point [percent], shape (nz, ny, nx).
+    def counts(self, kind: str) -> tuple[FloatArray, FloatArray]:
+        """Frames that succeeded and that were attempted, each of shape (nz, ny, nx).
 
         Parameters
         ----------
@@ -150,9 +150,20 @@ class CubeMap:
             "ik_free": self.n_ik_free > 0,
         }[kind]
         attempted = self.status != Status.NOT_ATTEMPTED
-        count = attempted.sum(axis=-1)
-        with np.errstate(invalid="ignore"):
-            return np.asarray(100.0 * (hit & attempted).sum(axis=-1) / count)
+        hits = (hit & attempted).sum(axis=-1)
+        return hits.astype(float), attempted.sum(axis=-1).astype(float)
+
+    def percent(self, kind: str) -> FloatArray:
+        """Eq. (1): share of frames per point [percent], shape (nz, ny, nx).
+
+        Parameters
+        ----------
+        kind : {"path", "ik", "ik_free"}
+        """
+        hits, attempted = self.counts(kind)
+        percent = np.full(hits.shape, np.nan)
+        np.divide(100.0 * hits, attempted, out=percent, where=attempted > 0)
+        return percent
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -230,6 +241,8 @@ class BinMap:
     connected : uint8 array, shape (nl, ny, nx, no)
         1 where the roadmap proves a path, whether or not an attempt found one.
     path_found : uint8 array, shape (nl, ny, nx, no, nr)
+    hit_time_limit : uint8 array, same shape
+        1 where the limit on wall-clock time ended the attempt; zeros if left out.
     path_length, path_length_total : array, same shape
         Planned part, and planned part plus straight approach [rad].
     tcp_path_length : array, same shape
@@ -273,8 +286,11 @@ class BinMap:
     stamp: Stamp
     provenance: Provenance
     run: RunInfo = RunInfo()
+    hit_time_limit: CodeArray = field(default_factory=lambda: np.zeros(0, np.uint8))
 
     def __post_init__(self) -> None:
+        if self.hit_time_limit.size == 0:
+            object.__setattr__(self, "hit_time_limit", np.zeros_like(self.path_found))
         freeze(self)
 
 

@@ -1,0 +1,40 @@
+"""A checksum over the bytes of an artefact, behind the end of the HDF5 data.
+
+The HDF5 library trusts what it reads: on a file with a few flipped bits it can loop
+for ever. So no artefact is handed to it before its bytes have been compared with this
+seal. Readers of HDF5 ignore what follows the end of the file that the superblock
+names. A program that opens the file for writing cuts the seal off; such a file is
+still read, and checked by its ``integrity_sha256``.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import re
+
+SIGNATURE = b"\x89HDF\r\n\x1a\n"
+
+_PREFIX = b"\nreachmap-seal sha256 "
+_PATTERN = re.compile(re.escape(_PREFIX) + rb"([0-9a-f]{64})\n\Z")
+SEAL_BYTES = len(_PREFIX) + 65
+
+
+def seal(image: bytes) -> bytes:
+    """Make the line that is written behind an HDF5 image."""
+    return _PREFIX + hashlib.sha256(image).hexdigest().encode() + b"\n"
+
+
+def unseal(data: bytes) -> tuple[bytes, bool | None]:
+    """Split a file into its HDF5 image and the verdict of its seal.
+
+    Returns
+    -------
+    image : bytes
+    intact : bool or None
+        Whether the seal fits the image; None where there is no seal.
+    """
+    found = _PATTERN.search(data, max(0, len(data) - SEAL_BYTES))
+    if found is None:
+        return data, None
+    image = data[: found.start()]
+    return image, hashlib.sha256(image).hexdigest().encode() == found.group(1)

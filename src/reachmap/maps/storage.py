@@ -1,0 +1,184 @@
+"""Artefacts on disk: written whole or not at all, read checked or not at all."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+
+from reachmap.errors import EngineError, MapFileError
+from reachmap.maps.contract import check_ranges, check_structure
+from reachmap.maps.hashing import content_sha256, integrity_sha256
+from reachmap.maps.hdf5 import (
+    StructureError,
+    attributes_from_image,
+    image_from_tree,
+    tree_from_image,
+)
+from reachmap.maps.layouts import LAYOUTS, layout_of
+from reachmap.maps.publish import publish
+from reachmap.maps.schema import FORMAT_VERSION, Layout
+from reachmap.maps.seal import SIGNATURE, seal, unseal
+from reachmap.maps.tree import Tree
+
+MAX_PROBLEMS = 8
+"""Mistakes of one file that are listed before the rest is only counted."""
+
+
+def store(path: Path, tree: Tree, layout: Layout, *, overwrite: bool = False) -> str:
+    """Check an artefact against its own format and put it in place.
+
+    Returns
+    -------
+    str
+        Its ``content_sha256``.
+
+    Raises
+    ------
+    EngineError
+        It breaks its format: a defect of the producer, nothing is written.
+    OutputError
+        It cannot be written there.
+    """
+    problems = check_tree(tree, layout)
+    if problems:
+        raise EngineError(f"{path}: not written, {text}" for text in _listed(problems))
+    image = image_from_tree(tree)
+    publish(path, [image, seal(image)], overwrite=overwrite)
+    return str(tree.attributes["content_sha256"])
+
+
+def load(path: Path, layout: Layout | None = None) -> tuple[Tree, Layout]:
+    """Read an artefact, checked from the bytes up to what its numbers say.
+
+    Parameters
+    ----------
+    path : Path
+    layout : Layout, optional
+        What is expected; without it, any artefact will do.
+
+    Raises
+    ------
+    MapFileError
+        The file is missing, damaged, of another kind, of a newer major version or
+        not an artefact at all.
+    """
+    image = read_image(path, layout)
+    try:
+        found = identify(path, attributes_from_image(image), layout)
+        tree = tree_from_image(image)
+    except StructureError as error:
+        raise MapFileError(f"{path}: damaged, {error}; {_expected(layout)}") from error
+    problems = check_hashes(tree)[:1] or check_tree(tree, found)
+    if problems:
+        raise MapFileError(
+            f"{path}: damaged {found.name}, {text}; `{found.command}` makes a new one"
+            for text in _listed(problems)
+        )
+    return tree, found
+
+
+def check_tree(tree: Tree, layout: Layout) -> list[str]:
+    """Check structure, then ranges, then what the numbers say to each other."""
+    return check_structure(tree, layout) or (
+        check_ranges(tree, layout) + layout.check(tree)
+    )
+
+
+def check_hashes(tree: Tree) -> list[str]:
+    """Compare both checksums with the contents."""
+    problems = []
+    if tree.attributes.get("content_sha256") != content_sha256(tree):
+        problems.append("its content does not match content_sha256")
+    if tree.attributes.get("integrity_sha256") != integrity_sha256(tree):
+        problems.append("it was changed after it was written (integrity_sha256)")
+    return problems
+
+
+def read_image(path: Path, layout: Layout | None = None) -> bytes:
+    """Read a file as an HDF5 image that is what was written, as far as bytes tell."""
+    image, intact = unseal(read_bytes(path, layout))
+    if not image.startswith(SIGNATURE):
+        raise MapFileError(f"{path}: {_foreign(image)}; {_expected(layout)}")
+    if intact is False:
+        raise MapFileError(
+            f"{path}: damaged, its bytes do not match its seal; {_expected(layout)}"
+        )
+    return image
+
+
+def read_bytes(path: Path, layout: Layout | None = None) -> bytes:
+    """Read a file, in words a user can act on when that fails."""
+    try:
+        return Path(path).read_bytes()
+    except FileNotFoundError as error:
+        raise MapFileError(f"{path}: no such file; {_expected(layout)}") from error
+    except OSError as error:
+        reason = error.strerror or type(error).__name__
+        raise MapFileError(f"{path}: cannot be read ({reason})") from error
+
+
+def artefact_kind(path: Path) -> str | None:
+    """Kind of an artefact, as in ``"bin_map"``; None for anything else.
+
+    Never raises. Only the seal and the root attributes are looked at.
+    """
+    try:
+        image, intact = unseal(Path(path).read_bytes())
+        if intact is False or not image.startswith(SIGNATURE):
+            return None
+        layout = layout_of(attributes_from_image(image).get("format"))
+    except (OSError, ValueError, StructureError):
+        return None
+    return layout.kind if layout else None
+
+
+def identify(
+    path: Path, attributes: Mapping[str, object], layout: Layout | None
+) -> Layout:
+    """Say which layout a file follows; refuse other kinds and newer versions."""
+    name = attributes.get("format")
+    found = layout_of(name)
+    if found is None:
+        what = f"of the format {name!r}" if name else "with no format"
+        raise MapFileError(f"{path}: an HDF5 file {what}; {_expected(layout)}")
+    if layout is not None and found.kind != layout.kind:
+        raise MapFileError(
+            f"{path}: a {found.name} ({found.format}), which `{found.command}` makes; "
+            f"{_expected(layout)}"
+        )
+    version = str(attributes.get("format_version"))
+    own = FORMAT_VERSION.partition(".")[0]
+    if not re.fullmatch(r"[0-9]{1,6}\.[0-9]{1,6}", version):
+        raise MapFileError(f"{path}: damaged, its format_version is {version!r}")
+    if version.partition(".")[0] != own:
+        raise MapFileError(
+            f"{path}: a {found.name} of version {version}, but this reachmap reads "
+            f"{own}.x; a newer reachmap may read it"
+        )
+    return found
+
+
+def _expected(layout: Layout | None) -> str:
+    if layout is None:
+        names = ", ".join(item.name for item in LAYOUTS.values())
+        return f"expected one of reachmap's artefacts: {names}"
+    return f"expected a {layout.name} ({layout.format}), which `{layout.command}` makes"
+
+
+def _foreign(data: bytes) -> str:
+    """Name what a file is that is not HDF5."""
+    if not data:
+        return "an empty file"
+    if data.lstrip()[:1] in (b"{", b"["):
+        return "looks like JSON, not an HDF5 file"
+    if b"\0" not in data[:4096]:
+        return "a text, not an HDF5 file"
+    return "not an HDF5 file"
+
+
+def _listed(problems: list[str]) -> list[str]:
+    """Keep the first few mistakes, and say how many more there are."""
+    shown = problems[:MAX_PROBLEMS]
+    rest = len(problems) - len(shown)
+    return [*shown, f"and {rest} more mistakes"] if rest else shown
