@@ -1,0 +1,46 @@
+"""``reachmap merge``: one artefact from the journals of shards."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import click
+
+from reachmap.cli.options import (
+    INPUT_FILE,
+    json_option,
+    output_option,
+    overwrite_option,
+)
+
+
+@click.command()
+@click.argument("shards", metavar="SHARD...", nargs=-1, required=True, type=INPUT_FILE)
+@output_option(required=True, help="Write the joined artefact here.")
+@overwrite_option
+@json_option
+def command(
+    shards: tuple[Path, ...], output: Path, overwrite: bool, as_json: bool
+) -> None:
+    """Join the journals of shards into one artefact.
+
+    SHARD... are the journals that runs with --shard I/N left, all N of them, in any
+    order. They must come from the same cell, seed, settings and package versions.
+    The artefact has the same content hash as that of a single run; the journals are
+    left as they are.
+
+    Example: reachmap merge bin.shard-*-of-3.journal -o bin.h5
+    """
+    from reachmap.tools.merge import merge
+
+    outcome = merge(shards, output=output, overwrite=overwrite)
+    if as_json:
+        answer = {
+            "output": str(outcome.path),
+            "shards": len(shards),
+            "units": outcome.resumed,
+        }
+        click.echo(json.dumps(answer))
+    else:
+        click.echo(f"{outcome.path}: {outcome.resumed} units of {len(shards)} shards")

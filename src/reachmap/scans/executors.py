@@ -1,0 +1,167 @@
+"""Where the units run: the one place that knows ``--executor`` names.
+
+====================== ===========================================================
+Name                   Workers
+====================== ===========================================================
+processes              processes of this machine; one worker is this process
+dask:local             a Dask cluster on this machine, gone after the run
+dask:tcp://HOST:PORT   a Dask cluster that is there already (also ``dask:tls://…``)
+====================== ===========================================================
+
+Any other ``concurrent.futures.Executor`` takes part as :func:`lane_of`.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import Executor
+from contextlib import ExitStack, contextmanager
+from typing import Any
+
+from reachmap.errors import MissingExtraError, OutputError, SettingsError
+from reachmap.scans.crew import LaneSpec
+from reachmap.scans.tasks import Parcel
+from reachmap.scans.workers import in_process_lane, one_thread_each, process_lanes
+
+UNITS_PER_THREAD = 4
+WINDOW_AGE_S = 5.0
+WAIT_FOR_WORKERS_S = 300.0
+SCHEMES = ("tcp://", "tls://", "ws://", "wss://")
+
+
+@contextmanager
+def open_lanes(name: str, workers: int, parcel: Parcel) -> Iterator[list[LaneSpec]]:
+    """Make the lanes that an ``--executor`` name stands for.
+
+    Parameters
+    ----------
+    name : str
+        See the table of this module.
+    workers : int
+        Number of workers; a Dask cluster that is there already has its own.
+    parcel : Parcel
+
+    Yields
+    ------
+    list of LaneSpec
+
+    Raises
+    ------
+    SettingsError
+        For a name that is not in the table.
+    MissingExtraError
+        When Dask is not installed.
+    """
+    check_executor(name)
+    if name != "processes":
+        with _dask_client(name.removeprefix("dask:"), workers) as client:
+            yield [_dask_lane(client, parcel)]
+    elif workers == 1:
+        yield [in_process_lane(parcel)]
+    else:
+        with one_thread_each():
+            yield process_lanes(parcel, workers)
+
+
+def check_executor(name: str) -> None:
+    """Refuse a name that is not in the table of this module.
+
+    Raises
+    ------
+    SettingsError
+    """
+    address = name.removeprefix("dask:")
+    if name == "processes" or name == "dask:local":
+        return
+    if address == name or not address.startswith(SCHEMES):
+        raise SettingsError(
+            f"executor {name!r}: expected processes, dask:local or dask:tcp://HOST:PORT"
+        )
+
+
+def lane_of(make: Callable[[], Executor], parcel: Parcel, *, workers: int) -> LaneSpec:
+    """Lane of any executor, such as one of ``mpi4py.futures``.
+
+    Parameters
+    ----------
+    make : callable
+        Makes the executor; called again after its workers have died.
+    parcel : Parcel
+    workers : int
+        Number of units it can work on at a time.
+    """
+    return LaneSpec(
+        start=make,
+        stop=lambda executor: executor.shutdown(wait=False, cancel_futures=True),
+        parcel=parcel,
+        window=lambda: UNITS_PER_THREAD * workers,
+    )
+
+
+@contextmanager
+def _dask_client(address: str, workers: int) -> Iterator[Any]:
+    distributed = _distributed()
+    with ExitStack() as stack:
+        if address == "local":
+            stack.enter_context(one_thread_each())
+            address = stack.enter_context(
+                distributed.LocalCluster(
+                    n_workers=workers,
+                    threads_per_worker=1,
+                    processes=True,
+                    dashboard_address=None,
+                )
+            )
+        try:
+            client = stack.enter_context(
+                distributed.Client(address, set_as_default=False)
+            )
+            client.wait_for_workers(1, timeout=WAIT_FOR_WORKERS_S)
+        except (OSError, TimeoutError) as error:
+            raise OutputError(f"no Dask cluster at {address}: {error}") from error
+        yield client
+
+
+def _distributed() -> Any:
+    try:
+        import distributed
+    except ImportError as error:
+        raise MissingExtraError(
+            "this executor needs Dask: pip install 'reachmap-cells[dask]'"
+        ) from error
+    return distributed
+
+
+def _dask_lane(client: Any, parcel: Parcel) -> LaneSpec:
+    return LaneSpec(
+        # Units are not functions of their arguments to Dask (pure): one that is
+        # tried again must be computed again.
+        start=lambda: client.get_executor(pure=False),
+        stop=lambda executor: executor.shutdown(wait=False, cancel_futures=True),
+        parcel=parcel,
+        window=_Window(client),
+        deaths=_dask_deaths,
+    )
+
+
+class _Window:
+    """Units in flight for a cluster that may grow and shrink."""
+
+    def __init__(self, client: Any) -> None:
+        self._client = client
+        self._asked_s = -WINDOW_AGE_S
+        self._units = 1
+
+    def __call__(self) -> int:
+        if time.monotonic() - self._asked_s > WINDOW_AGE_S:
+            threads = sum(self._client.nthreads().values())
+            self._units = UNITS_PER_THREAD * max(1, threads)
+            self._asked_s = time.monotonic()
+        return self._units
+
+
+def _dask_deaths(error: BaseException) -> int:
+    if not isinstance(error, _distributed().scheduler.KilledWorker):
+        return 0
+    return int(error.allowed_failures) + 1

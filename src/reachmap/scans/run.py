@@ -1,0 +1,298 @@
+"""Running a scan: journal, workers, artefact. Interrupt it anywhere, start it again.
+
+::
+
+    work ──▶ open_lanes ──▶ Crew.replies ──▶ Journal ──▶ Results ──▶ kind.assemble/write
+
+Payloads reach the artefact through the journal only, so that one that was computed
+just now and one that an earlier run left are the same bits.
+"""
+
+from __future__ import annotations
+
+import json
+import logging
+import platform
+import shlex
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from reachmap.errors import OutputError
+from reachmap.maps.records import RunInfo
+from reachmap.scans.crew import Crew
+from reachmap.scans.executors import check_executor, open_lanes
+from reachmap.scans.journal import (
+    SYNC_INTERVAL_S,
+    Journal,
+    journal_path,
+    open_journal,
+)
+from reachmap.scans.journal_format import Header
+from reachmap.scans.progress import Progress
+from reachmap.scans.results import Results, last_line
+from reachmap.scans.signals import Interrupted, StopRequest, stop_signals
+from reachmap.scans.tasks import package_versions, parcel_from_work
+from reachmap.scans.work import Work
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Outcome:
+    """How a run ended.
+
+    Attributes
+    ----------
+    path : Path
+        The artefact, or the journal of a shard.
+    artefact : object
+        What was written; None for a shard.
+    computed, resumed : int
+        Units done now, and by earlier runs.
+    run : RunInfo
+    """
+
+    path: Path
+    artefact: Any
+    computed: int
+    resumed: int
+    run: RunInfo
+
+
+def run_scan(
+    work: Work,
+    *,
+    output: Path,
+    workers: int = 1,
+    executor: str = "processes",
+    shard: tuple[int, int] | None = None,
+    restart: bool = False,
+    overwrite: bool = False,
+    progress: Progress | None = None,
+) -> Outcome:
+    """Compute a work and publish its artefact, going on where an earlier run ended.
+
+    Parameters
+    ----------
+    work : Work
+    output : Path
+        The artefact. Its journal lies beside it until it is published.
+    workers : int
+        Processes; 1 works in this process.
+    executor : str
+        See :mod:`reachmap.scans.executors`.
+    shard : (int, int), optional
+        (i, N): do the i-th of N shares, and leave the journal for ``merge``.
+    restart : bool
+        Discard what an earlier run left.
+    overwrite : bool
+        Replace ``output``; not needed when its own journal lies beside it.
+    progress : Progress, optional
+
+    Returns
+    -------
+    Outcome
+
+    Raises
+    ------
+    OutputError
+        When ``output`` exists, cannot be written, or another run is at it.
+    MapFileError
+        When the journal belongs to other settings.
+    IncompleteError
+        When units failed (the artefact is there, but for them), or there is no room.
+    Interrupted
+        After Ctrl-C or SIGTERM; everything done is in the journal.
+    """
+    journal = journal_path(output, shard)
+    if shard is None and output.exists() and not (overwrite or journal.exists()):
+        raise OutputError(f"{output} exists: choose another output, or --overwrite it")
+    started, clock_s = datetime.now(UTC), time.monotonic()
+    with run_units(
+        work,
+        output=output,
+        workers=workers,
+        executor=executor,
+        shard=shard,
+        restart=restart,
+        progress=progress,
+    ) as results:
+        run = run_info(
+            started=started,
+            workers=workers,
+            wall_s={"units": time.monotonic() - clock_s},
+            cpu_s={"units": results.cpu_s},
+        )
+        path, artefact = journal, None
+        if shard is None:
+            path, artefact = (
+                output,
+                work.kind.assemble(results.document, results, run=run),
+            )
+            work.kind.write(output, artefact, overwrite=True)
+    results.check_failures(path)
+    return Outcome(
+        path=path,
+        artefact=artefact,
+        computed=results.done - results.resumed,
+        resumed=results.resumed,
+        run=run,
+    )
+
+
+@contextmanager
+def run_units(
+    work: Work,
+    *,
+    output: Path,
+    workers: int = 1,
+    executor: str = "processes",
+    shard: tuple[int, int] | None = None,
+    restart: bool = False,
+    progress: Progress | None = None,
+) -> Iterator[Results]:
+    """Compute the units that are not done; the part of :func:`run_scan` before writing.
+
+    The journal stays locked for the ``with`` block, in which the artefact is to be
+    published. Leaving the block normally removes the journal, unless units failed or
+    it is a shard's.
+
+    Parameters
+    ----------
+    work, output, workers, executor, shard, restart, progress
+        As for :func:`run_scan`.
+
+    Yields
+    ------
+    Results
+        Payloads of all units, of a shard's units for a shard.
+
+    Raises
+    ------
+    ReachmapError, Interrupted
+        As for :func:`run_scan`.
+    """
+    check_executor(executor)
+    # One unit at a time in this process: nobody is there to look after the clock or
+    # a signal while it is computed.
+    alone = executor == "processes" and workers == 1
+    with (
+        open_journal(
+            journal_path(output, shard),
+            header_of(work, shard),
+            restart=restart,
+            sync_interval_s=0.0 if alone else SYNC_INTERVAL_S,
+        ) as journal,
+        stop_signals(at_once=alone) as stop,
+    ):
+        resumed = len(journal.entries.results)
+        progress = progress or Progress("", quiet=True)
+        try:
+            _compute_missing(work, journal, workers, executor, progress, stop)
+            stop.at_once = True
+            results = Results(work.kind, [journal.entries], resumed=resumed)
+            yield results
+        except KeyboardInterrupt:
+            raise Interrupted(_farewell(journal)) from None
+        if shard is None and not results.failed:
+            journal.remove()
+
+
+def header_of(work: Work, shard: tuple[int, int] | None = None) -> Header:
+    """First line of the journal of a work; package versions are settings too."""
+    return Header(
+        kind=work.kind.name,
+        units=work.units,
+        shard=shard or (1, 1),
+        settings={**work.settings, "packages": package_versions()},
+        document=work.document,
+    )
+
+
+def run_info(
+    *,
+    started: datetime,
+    workers: int,
+    wall_s: dict[str, float],
+    cpu_s: dict[str, float],
+) -> RunInfo:
+    """Record of a run that ends now, on this machine, by this command."""
+    return RunInfo(
+        started=started.isoformat(timespec="seconds"),
+        finished=datetime.now(UTC).isoformat(timespec="seconds"),
+        host=platform.node(),
+        command_line=command_line(),
+        workers=workers,
+        wall_s=wall_s,
+        cpu_s=cpu_s,
+    )
+
+
+def command_line() -> str:
+    """Return the command that is running, as one could type it."""
+    name = Path(sys.argv[0]).name
+    program = "reachmap" if name in ("reachmap", "__main__.py") else name
+    return shlex.join([program, *sys.argv[1:]])
+
+
+def _compute_missing(
+    work: Work,
+    journal: Journal,
+    workers: int,
+    executor: str,
+    progress: Progress,
+    stop: StopRequest,
+) -> None:
+    entries = journal.entries
+    before = [record.measure for record in entries.results.values()]
+    todo = [unit for unit in entries.header.own_units() if unit not in entries.results]
+    if before:
+        log.info("%d units were done before, %d are left", len(before), len(todo))
+    progress.begin(
+        _own_frames(work, entries.header),
+        done=sum(measure.frames for measure in before),
+        ok=sum(measure.ok for measure in before),
+    )
+    if not todo:
+        progress.end()
+        return
+    with (
+        open_lanes(executor, workers, parcel_from_work(work)) as lanes,
+        Crew(lanes) as crew,
+        closing(crew.replies(todo)) as replies,
+    ):
+        for reply in replies:
+            stop.check()
+            if reply is None:
+                journal.sync_if_due()
+                progress.tick()
+                continue
+            journal.append(
+                reply.unit, reply.payload, failed=reply.failed, measure=reply.measure
+            )
+            if reply.failed:
+                text = json.loads(reply.payload)
+                log.warning("unit %d failed: %s", reply.unit, last_line(text))
+                log.debug("%s", text)
+            frames = reply.measure.frames or work.total_frames // work.units
+            progress.add(frames, reply.measure.ok)
+    progress.end()
+
+
+def _own_frames(work: Work, header: Header) -> int:
+    return work.total_frames * len(header.own_units()) // work.units
+
+
+def _farewell(journal: Journal) -> str:
+    entries = journal.entries
+    return (
+        f"interrupted: {len(entries.results)} of {len(entries.header.own_units())} "
+        f"units are safe in {journal.path}\n"
+        f"to go on: {command_line().replace(' --restart', '')}"
+    )

@@ -1,0 +1,67 @@
+"""Ctrl-C, SIGTERM and a closed terminal, taken at a moment that suits the run."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import FrameType
+
+STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+
+class Interrupted(KeyboardInterrupt):
+    """The run was told to stop; the text says what is safe and how to go on."""
+
+
+class StopRequest:
+    """Whether a signal has asked the run to stop.
+
+    Parameters
+    ----------
+    at_once : bool
+        Raise KeyboardInterrupt inside the handler, wherever the program is, instead
+        of leaving it to :meth:`check`. A second signal always does.
+    """
+
+    def __init__(self, *, at_once: bool) -> None:
+        self.at_once = at_once
+        self.requested = False
+
+    def check(self) -> None:
+        """Raise KeyboardInterrupt when a signal has come."""
+        if self.requested:
+            raise KeyboardInterrupt
+
+    def handle(self, number: int, frame: FrameType | None) -> None:
+        """Take a signal; for ``signal.signal``."""
+        again, self.requested = self.requested, True
+        if self.at_once or again:
+            raise KeyboardInterrupt
+
+
+@contextmanager
+def stop_signals(*, at_once: bool) -> Iterator[StopRequest]:
+    """Catch the signals that end a run; outside the main thread, catch none.
+
+    Parameters
+    ----------
+    at_once : bool
+        See :class:`StopRequest`.
+    """
+    request = StopRequest(at_once=at_once)
+    if threading.current_thread() is not threading.main_thread():
+        yield request
+        return
+    before = {number: signal.getsignal(number) for number in STOP_SIGNALS}
+    for number, handler in list(before.items()):
+        if handler in (signal.SIG_IGN, None):  # nohup and background jobs mean it
+            del before[number]
+    try:
+        for number in before:
+            signal.signal(number, request.handle)
+        yield request
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)

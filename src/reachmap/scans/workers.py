@@ -1,0 +1,126 @@
+"""Workers on this machine: one process per lane, or this process itself.
+
+Each process is an executor of its own, so that one that dies takes nobody else's
+work along, and it is certain which unit it was on.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from concurrent.futures import Executor, Future, ProcessPoolExecutor
+from contextlib import contextmanager
+from multiprocessing.connection import Connection
+from typing import ParamSpec, TypeVar
+
+from reachmap.scans.crew import LaneSpec
+from reachmap.scans.tasks import Parcel, deliver, forget
+
+THREAD_VARIABLES = (
+    "OMP_NUM_THREADS",
+    "OPENBLAS_NUM_THREADS",
+    "MKL_NUM_THREADS",
+    "NUMEXPR_NUM_THREADS",
+    "VECLIB_MAXIMUM_THREADS",
+)
+WINDOW = 2  # one unit at work and one at hand
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+
+class InProcess(Executor):
+    """Does each task at once, in this process; for ``-j 1``, debugging, coverage."""
+
+    def submit(
+        self, fn: Callable[P, R], /, *args: P.args, **kwargs: P.kwargs
+    ) -> Future[R]:
+        """Call ``fn``; the future is done when this returns."""
+        future: Future[R] = Future()
+        try:
+            future.set_result(fn(*args, **kwargs))
+        except Exception as error:
+            future.set_exception(error)
+        return future
+
+
+class WorkerProcess(ProcessPoolExecutor):
+    """A pool of one process that dies with this one, and promptly when told to."""
+
+    def __init__(self, parcel: Parcel) -> None:
+        spawn = multiprocessing.get_context("spawn")
+        # The worker holds the reading end of a pipe and leaves when it closes: when
+        # told to stop, and also when this process is killed.
+        self._reader, self._writer = spawn.Pipe(duplex=False)
+        super().__init__(
+            max_workers=1,
+            mp_context=spawn,
+            initializer=_begin,
+            initargs=(self._reader, parcel),
+        )
+
+    def end(self) -> None:
+        """Stop the worker, whatever it is doing."""
+        self._writer.close()
+        self._reader.close()
+        self.shutdown(wait=True, cancel_futures=True)
+
+
+def in_process_lane(parcel: Parcel) -> LaneSpec:
+    """Make the lane of ``-j 1``."""
+    return LaneSpec(
+        start=InProcess,
+        stop=lambda executor: forget(parcel),
+        parcel=parcel,
+        window=lambda: 1,
+        in_order=True,
+    )
+
+
+def process_lanes(parcel: Parcel, workers: int) -> list[LaneSpec]:
+    """One lane per worker process."""
+    return [
+        LaneSpec(
+            start=lambda: WorkerProcess(parcel),
+            stop=_end,
+            parcel=parcel.label(),
+            window=lambda: WINDOW,
+            in_order=True,
+        )
+        for _ in range(workers)
+    ]
+
+
+@contextmanager
+def one_thread_each() -> Iterator[None]:
+    """Make processes started meanwhile use one thread in numeric libraries."""
+    before = {name: os.environ.get(name) for name in THREAD_VARIABLES}
+    os.environ.update(dict.fromkeys(THREAD_VARIABLES, "1"))
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                os.environ.pop(name, None)
+            else:
+                os.environ[name] = value
+
+
+def _end(executor: Executor) -> None:
+    if isinstance(executor, WorkerProcess):
+        executor.end()
+
+
+def _begin(lifeline: Connection, parcel: Parcel) -> None:
+    """Begin a worker: leave Ctrl-C to the parent, and do not outlive it."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    deliver(parcel)
+    threading.Thread(target=_leave_with, args=(lifeline,), daemon=True).start()
+
+
+def _leave_with(lifeline: Connection) -> None:
+    lifeline.poll(None)
+    os._exit(1)
