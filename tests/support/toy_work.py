@@ -166,7 +166,8 @@ def main():
     )
     shard = options.pop("shard")
     options["shard"] = tuple(map(int, shard.split("/"))) if shard else None
-    logging.basicConfig(level=logging.INFO, format="%(message)s")
+    logging.getLogger("reachmap").setLevel(logging.INFO)
+    logging.getLogger("reachmap").addHandler(logging.StreamHandler())
     try:
         outcome = run_scan(toy_work(toy), progress=Progress("toy"), **options)
     except ReachmapError as error:

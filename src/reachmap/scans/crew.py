@@ -227,7 +227,7 @@ class Crew:
         elif sure or len(units) < 2:
             self._waiting.extendleft(reversed(units[1:]))
             for unit in units[:1]:
-                self._strike(unit, 1)
+                self._strike(lane, unit, 1)
         else:
             log.info("workers died over units %s: each is tried alone", units)
             lane.suspects.extend(units)
@@ -245,20 +245,23 @@ class Crew:
         self, lane: Lane, unit: int, deaths: int, *, alone: bool
     ) -> None:
         if alone:
-            self._strike(unit, deaths)
+            self._strike(lane, unit, deaths)
         else:
             lane.suspects.append(unit)
 
-    def _strike(self, unit: int, deaths: int) -> None:
+    def _strike(self, lane: Lane, unit: int, deaths: int) -> None:
         self._strikes[unit] += deaths
         count = self._strikes[unit]
-        if count < STRIKES:
-            log.info("a worker died at unit %d (%d of %d)", unit, count, STRIKES)
-            self._waiting.appendleft(unit)
+        if count >= STRIKES:
+            text = f"killed {count} workers"
+            log.warning("unit %d %s and is given up", unit, text)
+            self._given_up.append(Reply(unit=unit, payload=compact(text), failed=True))
             return
-        log.warning("unit %d killed %d workers and is given up", unit, count)
-        text = compact(f"killed {count} workers")
-        self._given_up.append(Reply(unit=unit, payload=text, failed=True))
+        log.info("a worker died at unit %d (%d of %d)", unit, count, STRIKES)
+        if lane.spec.in_order:
+            self._waiting.appendleft(unit)
+        else:
+            lane.suspects.append(unit)
 
 
 def _exception(future: Future[Any]) -> BaseException | None:

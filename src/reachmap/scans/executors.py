@@ -13,13 +13,20 @@ Any other ``concurrent.futures.Executor`` takes part as :func:`lane_of`.
 
 from __future__ import annotations
 
+import logging
+import math
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor
 from contextlib import ExitStack, contextmanager
 from typing import Any
 
-from reachmap.errors import MissingExtraError, OutputError, SettingsError
+from reachmap.errors import (
+    IncompleteError,
+    MissingExtraError,
+    OutputError,
+    SettingsError,
+)
 from reachmap.scans.crew import LaneSpec
 from reachmap.scans.tasks import Parcel
 from reachmap.scans.workers import in_process_lane, one_thread_each, process_lanes
@@ -104,23 +111,40 @@ def _dask_client(address: str, workers: int) -> Iterator[Any]:
     distributed = _distributed()
     with ExitStack() as stack:
         if address == "local":
-            stack.enter_context(one_thread_each())
-            address = stack.enter_context(
-                distributed.LocalCluster(
-                    n_workers=workers,
-                    threads_per_worker=1,
-                    processes=True,
-                    dashboard_address=None,
-                )
-            )
+            address = stack.enter_context(_local_cluster(workers)).scheduler_address
         try:
-            client = stack.enter_context(
-                distributed.Client(address, set_as_default=False)
-            )
+            client = distributed.Client(address, set_as_default=False)
+            stack.enter_context(client)
             client.wait_for_workers(1, timeout=WAIT_FOR_WORKERS_S)
         except (OSError, TimeoutError) as error:
-            raise OutputError(f"no Dask cluster at {address}: {error}") from error
+            raise OutputError(f"no Dask workers at {address}: {error}") from error
         yield client
+
+
+@contextmanager
+def _local_cluster(workers: int) -> Iterator[Any]:
+    """Start a cluster of this machine that leaves judging dead workers to us."""
+    import dask
+
+    settings = {
+        # The first death is reported: the crew tries the unit again, alone.
+        "distributed.scheduler.allowed-failures": 0,
+        # Otherwise a worker that is being restarted this long after its death, by
+        # chance a second time, is taken for lost and never comes back.
+        "distributed.deploy.lost-worker-timeout": "1 day",
+    }
+    with (
+        dask.config.set(settings),
+        one_thread_each(),
+        _distributed().LocalCluster(
+            n_workers=workers,
+            threads_per_worker=1,
+            processes=True,
+            dashboard_address="127.0.0.1:0",
+            silence_logs=logging.CRITICAL,
+        ) as cluster,
+    ):
+        yield cluster
 
 
 def _distributed() -> Any:
@@ -135,10 +159,9 @@ def _distributed() -> Any:
 
 def _dask_lane(client: Any, parcel: Parcel) -> LaneSpec:
     return LaneSpec(
-        # Units are not functions of their arguments to Dask (pure): one that is
-        # tried again must be computed again.
+        # Not pure: a unit that is tried again must be computed again.
         start=lambda: client.get_executor(pure=False),
-        stop=lambda executor: executor.shutdown(wait=False, cancel_futures=True),
+        stop=lambda executor: executor.shutdown(wait=False),
         parcel=parcel,
         window=_Window(client),
         deaths=_dask_deaths,
@@ -146,19 +169,34 @@ def _dask_lane(client: Any, parcel: Parcel) -> LaneSpec:
 
 
 class _Window:
-    """Units in flight for a cluster that may grow and shrink."""
+    """Units in flight for a cluster that may grow, shrink and go away."""
 
     def __init__(self, client: Any) -> None:
         self._client = client
-        self._asked_s = -WINDOW_AGE_S
+        self._asked_s = -math.inf
+        self._seen_s = time.monotonic()
         self._units = 1
 
     def __call__(self) -> int:
-        if time.monotonic() - self._asked_s > WINDOW_AGE_S:
-            threads = sum(self._client.nthreads().values())
-            self._units = UNITS_PER_THREAD * max(1, threads)
-            self._asked_s = time.monotonic()
+        now = time.monotonic()
+        if now - self._asked_s > WINDOW_AGE_S:
+            self._asked_s = now
+            self._ask(now)
         return self._units
+
+    def _ask(self, now: float) -> None:
+        try:
+            threads = sum(self._client.nthreads().values())
+        except (OSError, TimeoutError):
+            threads = 0
+        if threads:
+            self._seen_s = now
+            self._units = UNITS_PER_THREAD * threads
+        elif now - self._seen_s > WAIT_FOR_WORKERS_S:
+            raise IncompleteError(
+                f"the Dask cluster has had no workers for {WAIT_FOR_WORKERS_S:.0f} s; "
+                "what is done is kept, the same command goes on from there"
+            )
 
 
 def _dask_deaths(error: BaseException) -> int:
