@@ -8,7 +8,7 @@ as one large product), so results are the same for every division of work.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -46,6 +46,10 @@ class SerialChain:
     axes_base: FloatArray
     offsets_base: FloatArray
     R_base_tcp_zero: FloatArray
+    _parts: FloatArray = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "_parts", _joint_parts(self.T_fixed[:-1]))
 
     @classmethod
     def from_robot(cls, robot: RobotModel) -> SerialChain:
@@ -131,7 +135,7 @@ class SerialChain:
         """Compute the transforms from joint to joint, (n, dof) to (dof, n, 4, 4)."""
         # Per joint F Rz(q) = A + cos(q) B + sin(q) C: three sweeps over contiguous
         # memory; a matrix product would be faster, but rounds differently by size.
-        A, B, C = self._parts()
+        A, B, C = self._parts
         steps = np.cos(Q.T)[:, :, None] * B[:, None]
         steps += np.sin(Q.T)[:, :, None] * C[:, None]
         steps += A[:, None]
@@ -140,16 +144,6 @@ class SerialChain:
             steps[k] = self.T_fixed[k]
             steps[k, :, :, 3] += Q[:, k, None] * self.T_fixed[k, :, 2]
         return np.asarray(steps)
-
-    def _parts(self) -> FloatArray:
-        """Constant, cosine and sine part of each joint, shape (3, dof, 16)."""
-        parts = np.zeros((3, self.dof, 4, 4))
-        fixed = self.T_fixed[:-1]
-        parts[0, :, :, 2:] = fixed[..., 2:]
-        parts[1, :, :, :2] = fixed[..., :2]
-        parts[2, :, :, 0] = fixed[..., 1]
-        parts[2, :, :, 1] = -fixed[..., 0]
-        return parts.reshape(3, self.dof, 16)
 
 
 def pose_error(T_goal: FloatArray, T: FloatArray) -> FloatArray:
@@ -177,6 +171,16 @@ def pose_error(T_goal: FloatArray, T: FloatArray) -> FloatArray:
     scale = np.where(sine > 1e-12, angle / np.maximum(sine, 1e-12), 1.0)
     error[:, 3:] = v * scale[:, None]
     return error
+
+
+def _joint_parts(fixed: FloatArray) -> FloatArray:
+    """Split joint transforms into constant, cosine and sine part, (3, dof, 16)."""
+    parts = np.zeros((3, *fixed.shape))
+    parts[0, :, :, 2:] = fixed[..., 2:]
+    parts[1, :, :, :2] = fixed[..., :2]
+    parts[2, :, :, 0] = fixed[..., 1]
+    parts[2, :, :, 1] = -fixed[..., 0]
+    return parts.reshape(3, len(fixed), 16)
 
 
 def _axis_in_joint(joint: object, model: object) -> FloatArray:

@@ -37,6 +37,22 @@ _ALL_BRANCHES = 8
 _BLOCK = 2048
 
 
+def _turned(axis: tuple[float, float, float]) -> FloatArray:
+    """Small rotation about an axis of the TCP, shape (4, 4)."""
+    x, y, z = np.array(axis) * _ASIDE_RAD
+    # Of first order, then made orthonormal: exact to 1e-10, more than it needs.
+    R, _ = np.linalg.qr(np.array([[1, -z, y], [z, 1, -x], [-y, x, 1]]))
+    return transform_from_parts(R * np.sign(np.diag(R)), np.zeros(3))
+
+
+_ASIDE = _turned((0.48, 0.60, 0.64))
+
+# At a wrist singularity the direction decides which points of the curve are found.
+_ASIDE_FOUR_WAYS = tuple(
+    _turned(axis) for axis in ((1, 0, 0), (0, 1, 0), (-1, 0, 0), (0, -1, 0))
+)
+
+
 class EaikRows:
     """EAIK's raw rows for many poses.
 
@@ -141,10 +157,12 @@ class AnalyticSolver:
         rows = self._meeting(raw, T)
         counts = np.bincount(rows[1], minlength=len(T))
         doubtful = np.flatnonzero(counts < _ALL_BRANCHES)
+        if not len(doubtful):
+            return rows
         singular = doubtful[self._jumps(raw, T, doubtful)]
         if not len(singular):
             return rows
-        more = [self._from_aside(T, singular, axis) for axis in _ASIDE_AXES]
+        more = [self._from_aside(T, singular, turn) for turn in _ASIDE_FOUR_WAYS]
         all_rows = joined([rows, *more], self._chain.dof)
         return distinct(all_rows, self._chain.is_revolute)
 
@@ -154,6 +172,8 @@ class AnalyticSolver:
         residual = matrix_difference(T[frame], self._chain.forward_many(Q))
         met = residual <= MET
         near = ~met & (residual <= _NEAR)
+        if not near.any():
+            return distinct((Q[met], frame[met]), self._chain.is_revolute)
         Q_near, missed = refine_many(
             self._chain,
             Q[near],
@@ -173,7 +193,7 @@ class AnalyticSolver:
         Counting rows is not enough: where the arm is nearly stretched as well, rows
         that stand for a missing branch are least-squares rows on both sides.
         """
-        aside = self._rows(T[frames] @ _turned(_GENERIC_AXIS))
+        aside = self._rows(T[frames] @ _ASIDE)
         position = np.full(len(T), -1)
         position[frames] = np.arange(len(frames))
         of_interest = position[raw[1]] >= 0
@@ -184,9 +204,9 @@ class AnalyticSolver:
             self._chain.is_revolute,
         )
 
-    def _from_aside(self, T: FloatArray, frames: IntArray, axis: FloatArray) -> Rows:
+    def _from_aside(self, T: FloatArray, frames: IntArray, turn: FloatArray) -> Rows:
         """Solve poses turned aside, and come back to the poses themselves."""
-        Q, index = self._rows(T[frames] @ _turned(axis))
+        Q, index = self._rows(T[frames] @ turn)
         frame = frames[index]
         Q, residual = refine_many(
             self._chain, Q, T[frame], tolerance=1e-13, iterations=30, singular=True
@@ -216,19 +236,3 @@ def _padded(rows: Rows, n: int) -> FloatArray:
     slot = np.arange(len(Q)) - np.repeat(np.cumsum(counts) - counts, counts)
     table[frame, slot] = Q
     return table
-
-
-def _turned(axis: FloatArray) -> FloatArray:
-    """Small rotation about an axis of the TCP, shape (4, 4)."""
-    x, y, z = axis * _ASIDE_RAD
-    # First order, then made orthonormal: exact to 1e-10, which is all it needs.
-    R, _ = np.linalg.qr(np.array([[1, -z, y], [z, 1, -x], [-y, x, 1]]))
-    return transform_from_parts(R * np.sign(np.diag(R)), np.zeros(3))
-
-
-_GENERIC_AXIS = np.array([0.48, 0.60, 0.64])
-
-# At a wrist singularity the direction decides which points of the curve are found.
-_ASIDE_AXES = tuple(
-    np.array(axis, float) for axis in ((1, 0, 0), (0, 1, 0), (-1, 0, 0), (0, -1, 0))
-)

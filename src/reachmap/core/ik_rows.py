@@ -24,7 +24,7 @@ _TURN = 2.0 * np.pi
 
 def wrapped(Q: FloatArray, is_revolute: BoolArray | np.bool_) -> FloatArray:
     """Angles brought to [-π, π]; prismatic joints stay."""
-    return np.where(is_revolute, Q - _TURN * np.round(Q / _TURN), Q)
+    return Q - np.where(is_revolute, _TURN, 0.0) * np.round(Q * (1.0 / _TURN))
 
 
 def angular_distance(
@@ -51,7 +51,7 @@ def distinct(rows: Rows, is_revolute: BoolArray) -> Rows:
         if not len(same):
             break
         difference = angular_distance(Q[same + lag] - Q[same], is_revolute)
-        repeated = (difference < SAME_SOLUTION_RAD).all(axis=1)
+        repeated = np.maximum.reduce(difference, axis=1) < SAME_SOLUTION_RAD
         keep[same[repeated] + lag] = False
     return Q[keep], frame[keep]
 
