@@ -13,7 +13,8 @@ import pytest
 from reachmap.cli.table import COMMANDS
 
 ROOT = Path(__file__).parents[2]
-TUTORIAL = ROOT / "docs" / "tutorial" / "ur5.md"
+DOCS = ROOT / "docs"
+TUTORIAL = DOCS / "tutorial" / "ur5.md"
 
 # The commands are run as printed; the sizes come in through the environment.
 SMALL = {
@@ -45,20 +46,42 @@ def test_the_tutorial_shows_the_whole_pipeline() -> None:
     assert [name for name in shown if name in stages] == stages
 
 
-@pytest.mark.slow
-def test_the_tutorial_works(tmp_path: Path) -> None:
-    """Each command exits 0 and leaves the files that the text promises."""
-    missing = [n for n in PRODUCTS if not COMMANDS[n].is_available()]
-    if missing:
-        pytest.skip(f"not there yet: {missing}")
+def python_blocks(page: Path) -> str:
+    """The Python of a page, joined: later blocks build upon earlier ones."""
+    return "\n".join(
+        re.findall(r"```python\n(.*?)```", page.read_text(), flags=re.DOTALL)
+    )
+
+
+def run(command: list[str], folder: Path, shown: str) -> None:
+    """Run a command as the reader would; it must succeed."""
     search = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
     environment = {**os.environ, **SMALL, "PATH": search}
+    done = subprocess.run(
+        command,
+        cwd=folder,
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, f"$ {shown}\n{done.stdout}\n{done.stderr}"
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1200)
+def test_the_tutorial_works(tmp_path: Path) -> None:
+    """Each command exits 0 and leaves the files that the text promises.
+
+    The Python of the README and of the page on xarray then runs on those files.
+    """
+    missing = [name for name in PRODUCTS if not COMMANDS[name].is_available()]
+    if missing:
+        pytest.skip(f"not there yet: {missing}")
     for line in commands():
         typed = line.replace("EXAMPLES", str(ROOT / "examples"))
-        done = subprocess.run(
-            ["bash", "-euc", typed],
-            cwd=tmp_path, env=environment, capture_output=True, text=True, check=False,
-        )  # fmt: skip
-        assert done.returncode == 0, f"$ {line}\n{done.stdout}\n{done.stderr}"
+        run(["bash", "-euc", typed], tmp_path, line)
         for name in PRODUCTS.get(line.split()[1], []):
             assert (tmp_path / name).exists(), f"{line} did not write {name}"
+    for page in (ROOT / "README.md", TUTORIAL, DOCS / "how-to" / "read-in-xarray.md"):
+        run([sys.executable, "-c", python_blocks(page)], tmp_path, page.name)
