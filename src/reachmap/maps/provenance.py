@@ -14,8 +14,8 @@ from importlib import metadata
 from typing import TYPE_CHECKING, Any
 
 from reachmap.errors import MapFileError
-from reachmap.maps.hashing import canonical_json
 from reachmap.maps.records import Provenance, RunInfo
+from reachmap.maps.tree import plain
 
 if TYPE_CHECKING:
     from reachmap.cell.loaded import LoadedCell
@@ -119,12 +119,12 @@ def provenance_texts(provenance: Provenance) -> dict[str, str]:
     return {
         "cell_yaml": provenance.cell_yaml,
         "cell_resolved_json": provenance.cell_resolved_json,
-        "overrides_json": canonical_json(provenance.overrides),
+        "overrides_json": _json_text(provenance.overrides),
         "urdf": provenance.urdf,
         "srdf": provenance.srdf,
-        "files_sha256_json": canonical_json(provenance.files_sha256),
-        "packages_json": canonical_json(provenance.packages),
-        "settings_json": canonical_json(provenance.settings),
+        "files_sha256_json": _json_text(provenance.files_sha256),
+        "packages_json": _json_text(provenance.packages),
+        "settings_json": _json_text(provenance.settings),
         "source_sha256": provenance.source_sha256,
     }
 
@@ -152,8 +152,8 @@ def run_texts(run: RunInfo) -> dict[str, str]:
         "host": run.host,
         "command_line": run.command_line,
         "workers": str(run.workers),
-        "wall_s_json": canonical_json(run.wall_s),
-        "cpu_s_json": canonical_json(run.cpu_s),
+        "wall_s_json": _json_text(run.wall_s),
+        "cpu_s_json": _json_text(run.cpu_s),
     }
 
 
@@ -171,6 +171,11 @@ def run_from_texts(texts: Mapping[str, str], where: str) -> RunInfo:
         wall_s=_json(texts, "wall_s_json", where, dict),
         cpu_s=_json(texts, "cpu_s_json", where, dict),
     )
+
+
+def _json_text(value: Any) -> str:
+    """Write JSON that keeps the order of keys, as phases of a run have one."""
+    return json.dumps(plain(value), ensure_ascii=False)
 
 
 def _json(texts: Mapping[str, str], name: str, where: str, kind: type) -> Any:
