@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -10,7 +12,8 @@ import numpy as np
 from reachmap._typing import FloatArray
 from reachmap.cell.fields import CylinderShape, Shape
 from reachmap.cell.model import Cell
-from reachmap.cell.resources import NotFoundError, Resolver
+from reachmap.cell.resources import SCHEME, NotFoundError, Resolver
+from reachmap.cell.urdf import parse_xml
 from reachmap.geometry import (
     inverse_transform,
     rotation_from_rpy_deg,
@@ -69,16 +72,25 @@ def _star_outline(points: FloatArray) -> Outline:
 
 def _base_points(cell: Cell, urdf: str) -> FloatArray | None:
     try:
-        root = ElementTree.fromstring(urdf)
-        resolver = Resolver(directory=Path(), packages=cell.resources.packages)
+        root = parse_xml(urdf, "urdf")
+        find = partial(_mesh_path, cell)
         points = [
             part @ T[:3, :3].T + T[:3, 3]
             for link, T in _fixed_links(root, cell.robot.base_frame).items()
-            for part in _link_points(root, link, resolver)
+            for part in _link_points(root, link, find)
         ]
-    except (ElementTree.ParseError, NotFoundError, OSError, ValueError):
+    except (NotFoundError, OSError, ValueError):
         return None
     return np.concatenate(points) if points else None
+
+
+def _mesh_path(cell: Cell, reference: str) -> Path:
+    """Path of a mesh that the URDF names; NotFoundError if it is not here."""
+    resolver = Resolver(directory=Path(), packages=cell.resources.packages)
+    if reference.startswith(SCHEME):
+        return resolver.resolve(reference)
+    urdf, root = resolver.resolve_robot(cell.robot.urdf)
+    return resolver.resolve_from_urdf(reference, urdf.parent, root)
 
 
 def _fixed_links(root: ElementTree.Element, base: str | None) -> dict[str, FloatArray]:
@@ -86,7 +98,7 @@ def _fixed_links(root: ElementTree.Element, base: str | None) -> dict[str, Float
     joints = root.findall("joint")
     children = {_end(joint, "child") for joint in joints}
     links = [link.get("name", "") for link in root.findall("link")]
-    start = base or next(link for link in links if link not in children)
+    start = base or next((link for link in links if link not in children), "")
     poses = {start: np.eye(4)}
     fixed = [joint for joint in joints if joint.get("type") == "fixed"]
     # A link may be reached from either side; each pass adds at least one or ends it.
@@ -116,7 +128,7 @@ def _origin(element: ElementTree.Element) -> FloatArray:
 
 
 def _link_points(
-    root: ElementTree.Element, name: str, resolver: Resolver
+    root: ElementTree.Element, name: str, find: Callable[[str], Path]
 ) -> list[FloatArray]:
     found = []
     for link in root.findall("link"):
@@ -124,20 +136,20 @@ def _link_points(
             continue
         for collision in link.findall("collision"):
             T = _origin(collision)
-            points = _geometry_points(collision.find("geometry"), resolver)
+            points = _geometry_points(collision.find("geometry"), find)
             found.append(points @ T[:3, :3].T + T[:3, 3])
     return found
 
 
 def _geometry_points(
-    geometry: ElementTree.Element | None, resolver: Resolver
+    geometry: ElementTree.Element | None, find: Callable[[str], Path]
 ) -> FloatArray:
     shape = None if geometry is None else next(iter(geometry), None)
     if shape is None:
         return np.zeros((0, 3))
     if shape.tag == "mesh":
         scale = np.array(shape.get("scale", "1 1 1").split(), float)
-        path = resolver.resolve(shape.get("filename", ""))
+        path = find(shape.get("filename", ""))
         return _edge_points(read_stl_points(path).reshape(-1, 3, 3) * scale)
     numbers = {key: float(v) for key, v in shape.attrib.items() if key != "size"}
     if shape.tag == "box":

@@ -56,7 +56,7 @@ def context_of(provenance: Provenance) -> CellContext:
 def patch_shape(
     outlines: tuple[Outline, ...], x: FloatArray, y: FloatArray
 ) -> tuple[int, int]:
-    """Rows and columns of squares that a bin covers, odd so that one is the middle.
+    """Rows and columns of squares nearest to a bin's size, odd: one is the middle.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ def patch_shape(
     sides = np.array([np.ptp(o.polygon, axis=0) for o in outlines]).min(axis=0)
     steps = [float(np.diff(cell_edges(c)).min()) for c in (x, y)]
     columns, rows = (
-        max(1, int(np.ceil(side / step - 1e-9)))
+        1 + 2 * max(0, round((side / step - 1.0) / 2.0))
         for side, step in zip(sides, steps, strict=True)
     )
-    return rows + (rows + 1) % 2, columns + (columns + 1) % 2
+    return rows, columns

@@ -1,0 +1,73 @@
+"""``reachmap heatmap``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from reachmap.cli import options
+
+
+@click.command("heatmap")
+@click.argument(
+    "artefact", metavar="[FILE]", default="workspace.h5", type=options.INPUT_FILE
+)
+@click.option(
+    "--quantity",
+    type=click.Choice(["path", "ik", "ik-free", "difference", "all"]),
+    help="What to draw of a workspace map: path reachability (the default), an IK "
+    "solution, a collision-free one, or how much IK promises that no path keeps.",
+)
+@click.option(
+    "--level",
+    "levels",
+    type=float,
+    multiple=True,
+    metavar="Z",
+    help="Draw the level at this height [m] only. Repeatable.",
+)
+@click.option(
+    "--cmap",
+    "percent_map",
+    type=click.Choice(["RdYlGn", "viridis", "cividis"]),
+    default="RdYlGn",
+    show_default=True,
+    help="Colours of 0 to 100 %; viridis and cividis suit every colour vision.",
+)
+@click.option(
+    "--format",
+    "kind",
+    type=click.Choice(["png", "svg"]),
+    default="png",
+    show_default=True,
+    help="Format of the pictures.",
+)
+@click.option(
+    "--workspace",
+    type=options.INPUT_FILE,
+    metavar="PATH",
+    help="The map to draw a placement on; by default workspace.h5 beside it.",
+)
+@click.option(
+    "--csv", "tables", is_flag=True, help="Write the numbers as CSV files, too."
+)
+@options.output_option("heatmaps", help="Folder for the pictures.")
+@options.overwrite_option
+def command(artefact: Path, **settings: Any) -> None:
+    """Draw a workspace map, one picture per level.
+
+    FILE is a workspace map, workspace.h5 by default; a bin map or a placement is drawn
+    as well. A workspace map gives a picture of every level, seen from above, and one
+    of all levels together; a bin map gives its reachability after one and after all
+    attempts, the saturation, the costs and the approach directions; a placement the
+    bin on its level, the runner-up and the places that were considered. The names of
+    the files are printed.
+
+    Example: reachmap heatmap workspace.h5 --quantity all -o heatmaps
+    """
+    from reachmap.tools.heatmap import heatmap
+
+    for path in heatmap(artefact, **settings):
+        click.echo(path)

@@ -1,0 +1,206 @@
+"""Which pictures and tables an artefact gives, and what they are called."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Sequence
+from functools import partial
+
+import numpy as np
+
+from reachmap._typing import FloatArray
+from reachmap.errors import SettingsError
+from reachmap.maps.records import BinMap, BinPlacement, WorkspaceMap
+from reachmap.plots.approach import draw_approach
+from reachmap.plots.bin_map import draw_costs, draw_reachability
+from reachmap.plots.bin_view import percent_after
+from reachmap.plots.files import Picture, Table, level_table
+from reachmap.plots.heatmap import draw_level
+from reachmap.plots.levels import QUANTITY_NAMES, Quantity, level_names
+from reachmap.plots.overview import draw_overview
+from reachmap.plots.placement import draw_placement, placement_words
+from reachmap.plots.saturation import draw_saturation
+from reachmap.plots.stack import LevelStack, level_title, stack_of
+from reachmap.plots.style import PercentMap
+
+# How close a height must be to a level to mean it [m].
+LEVEL_TOLERANCE = 1e-3
+
+
+def workspace_album(
+    workspace: WorkspaceMap,
+    quantities: Sequence[Quantity],
+    *,
+    heights: Sequence[float] = (),
+    percent_map: PercentMap = "RdYlGn",
+    tables: bool = False,
+) -> list[Picture | Table]:
+    """List the pictures of a workspace map: one per level, then the overview.
+
+    Parameters
+    ----------
+    workspace : WorkspaceMap
+    quantities : sequence of str
+    heights : sequence of float
+        Levels to draw [m]; without any, all of them and the overview.
+    percent_map : str
+    tables : bool
+        Add a CSV file for each level.
+
+    Raises
+    ------
+    SettingsError
+        A height is no level of the map.
+    """
+    levels = find_levels(workspace.z, heights)
+    items: list[Picture | Table] = []
+    for quantity in quantities:
+        stack = stack_of(workspace, quantity)
+        for level in levels:
+            items += _level_items(stack, level, percent_map, tables)
+        if not heights:
+            items.append(
+                Picture(
+                    name=f"{quantity}_overview",
+                    title=f"{QUANTITY_NAMES[quantity]} on all levels",
+                    draw=partial(draw_overview, stack, percent_map=percent_map),
+                )
+            )
+    return items
+
+
+def _level_items(
+    stack: LevelStack, level: int, percent_map: PercentMap, tables: bool
+) -> list[Picture | Table]:
+    name = f"{stack.quantity}_z{level_names(stack.z)[level]}"
+    picture = Picture(
+        name=name,
+        title=level_title(stack, level),
+        draw=partial(draw_level, stack, level, percent_map=percent_map),
+    )
+    if not tables:
+        return [picture]
+    text = level_table(stack.x, stack.y, stack.values[level])
+    return [picture, Table(name=name, text=text)]
+
+
+def find_levels(z: FloatArray, heights: Sequence[float]) -> list[int]:
+    """Find the levels at some heights [m]; without any heights, all levels.
+
+    Raises
+    ------
+    SettingsError
+        A height is more than a millimetre from every level.
+    """
+    if not heights:
+        return list(range(z.size))
+    nearest = [int(np.abs(z - height).argmin()) for height in heights]
+    problems = [
+        f"--level: no level at z = {height:g} m (levels: {', '.join(level_names(z))})"
+        for height, index in zip(heights, nearest, strict=True)
+        if not abs(z[index] - height) <= LEVEL_TOLERANCE
+    ]
+    if problems:
+        raise SettingsError(problems)
+    return sorted(set(nearest))
+
+
+def bin_album(
+    bin_map: BinMap,
+    cost: FloatArray | None = None,
+    *,
+    percent_map: PercentMap = "RdYlGn",
+    tables: bool = False,
+) -> list[Picture | Table]:
+    """List the pictures of a bin map; those of a layer name it if there are several.
+
+    Parameters
+    ----------
+    bin_map : BinMap
+    cost : array, shape (nl, ny, nx, no), optional
+        J of each test grasp; not finite where it is not path reachable.
+    percent_map : str
+    tables : bool
+        Add the reachability of each layer as a CSV file.
+    """
+    items: list[Picture | Table] = []
+    for layer, height in enumerate(level_names(bin_map.layer)):
+        end = f"_layer{height}" if bin_map.layer.size > 1 else ""
+        items += [
+            Picture(
+                name=f"bin_reachability{end}",
+                title="Path reachability in the bin",
+                draw=partial(
+                    draw_reachability, bin_map, layer, percent_map=percent_map
+                ),
+            ),
+            Picture(
+                name=f"bin_costs{end}",
+                title="What reaching into the bin costs",
+                draw=partial(draw_costs, bin_map, cost, layer),
+            ),
+            Picture(
+                name=f"bin_approach{end}",
+                title="Which approach directions and rolls work where",
+                draw=partial(draw_approach, bin_map, layer),
+            ),
+        ]
+        if tables:
+            repeats = bin_map.path_found.shape[-1]
+            values = percent_after(bin_map, repeats)[layer]
+            text = level_table(bin_map.x, bin_map.y, values)
+            items.append(Table(name=f"bin_reachability{end}", text=text))
+    saturation = Picture(
+        name="bin_saturation",
+        title="Test grasps reached over the number of attempts",
+        draw=partial(draw_saturation, bin_map),
+    )
+    return [*items, saturation]
+
+
+def placement_album(
+    placement: BinPlacement,
+    workspace: WorkspaceMap | None = None,
+    *,
+    percent_map: PercentMap = "RdYlGn",
+    tables: bool = False,
+) -> list[Picture | Table]:
+    """List the picture of a placement, on the map it was chosen from if given."""
+    picture = Picture(
+        name="placement",
+        title=placement_words(placement)[0],
+        draw=partial(draw_placement, placement, workspace, percent_map=percent_map),
+    )
+    if not tables:
+        return [picture]
+    return [picture, Table(name="placement", text=_candidate_table(placement))]
+
+
+def _candidate_table(placement: BinPlacement) -> str:
+    """CSV of all candidates, the best first and the excluded ones last."""
+    stream = io.StringIO(newline="")
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow(
+        [
+            "x [m]",
+            "y [m]",
+            "z [m]",
+            "yaw [deg]",
+            "score [%]",
+            "worst point [%]",
+            "why not",
+        ]
+    )
+    for index in np.argsort(-np.nan_to_num(placement.score, nan=-1.0), kind="stable"):
+        x, y, z, yaw = placement.candidate_pose[index]
+        numbers = (placement.score[index], placement.worst_point[index])
+        writer.writerow(
+            [
+                *(f"{value:.4f}" for value in (x, y, z)),
+                f"{np.degrees(yaw):.2f}",
+                *("" if np.isnan(value) else f"{value:.2f}" for value in numbers),
+                placement.reason[index],
+            ]
+        )
+    return stream.getvalue()

@@ -1,0 +1,123 @@
+"""``reachmap heatmap``: an artefact in, pictures out."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Literal
+
+from reachmap.errors import SettingsError
+from reachmap.maps import (
+    artefact_kind,
+    read_bin_map,
+    read_placement,
+    read_workspace_map,
+)
+from reachmap.maps.records import BinMap, BinPlacement, WorkspaceMap
+from reachmap.plots.albums import bin_album, placement_album, workspace_album
+from reachmap.plots.files import Picture, Table, write_all
+from reachmap.plots.levels import QUANTITIES, Quantity
+from reachmap.plots.style import Format, PercentMap
+from reachmap.ranking.costs import grasp_costs
+from reachmap.ranking.settings import RankSettings
+from reachmap.ranking.table import table_from_bin_map
+
+logger = logging.getLogger(__name__)
+
+
+def heatmap(
+    artefact: Path,
+    *,
+    output: Path,
+    quantity: Quantity | Literal["all"] | None = None,
+    levels: Sequence[float] = (),
+    workspace: Path | None = None,
+    percent_map: PercentMap = "RdYlGn",
+    kind: Format = "png",
+    tables: bool = False,
+    overwrite: bool = False,
+) -> tuple[Path, ...]:
+    """Draw a workspace map, a bin map or a placement.
+
+    Parameters
+    ----------
+    artefact : Path
+    output : Path
+        Folder for the pictures; it is made if it is missing.
+    quantity : str, optional
+        What to draw of a workspace map; path reachability by default.
+    levels : sequence of float
+        Heights of the levels to draw [m]; without any, all and an overview.
+    workspace : Path, optional
+        Map to draw a placement on; by default ``workspace.h5`` beside it, if that is
+        the map the placement was made from.
+    percent_map : str
+        Colour map of reachabilities.
+    kind : {"png", "svg"}
+    tables : bool
+        Write the numbers as CSV files too.
+    overwrite : bool
+        Replace files that exist.
+
+    Returns
+    -------
+    tuple of Path
+        The files written.
+    """
+    found = artefact_kind(artefact)
+    if found in ("bin_map", "bin_placement") and (quantity or levels):
+        raise SettingsError(
+            f"{artefact}: --quantity and --level are for workspace maps (this is a "
+            f"{found.replace('_', ' ')})"
+        )
+    if workspace is not None and found != "bin_placement":
+        raise SettingsError(f"{artefact}: --workspace is for placements")
+    record: WorkspaceMap | BinMap | BinPlacement
+    items: list[Picture | Table]
+    if found == "bin_map":
+        record = read_bin_map(artefact)
+        items = _bin_items(record, percent_map, tables)
+    elif found == "bin_placement":
+        record = read_placement(artefact)
+        below = _map_below(artefact, record, workspace)
+        items = placement_album(record, below, percent_map=percent_map, tables=tables)
+    else:
+        record = read_workspace_map(artefact)
+        chosen = QUANTITIES if quantity == "all" else (quantity or "path",)
+        items = workspace_album(
+            record, chosen, heights=levels, percent_map=percent_map, tables=tables
+        )
+    return write_all(
+        output,
+        items,
+        kind=kind,
+        config_sha256=record.stamp.config_sha256,
+        overwrite=overwrite,
+    )
+
+
+def _bin_items(
+    bin_map: BinMap, percent_map: PercentMap, tables: bool
+) -> list[Picture | Table]:
+    table = table_from_bin_map(bin_map)
+    cost = grasp_costs(table, RankSettings().weights).reshape(table.shape)
+    return bin_album(bin_map, cost, percent_map=percent_map, tables=tables)
+
+
+def _map_below(
+    artefact: Path, placement: BinPlacement, given: Path | None
+) -> WorkspaceMap | None:
+    """Read the workspace map that a placement was chosen from."""
+    path = given or artefact.parent / "workspace.h5"
+    if given is None and artefact_kind(path) != "workspace_map":
+        logger.warning("%s: not there, so the placement is drawn without a map", path)
+        return None
+    workspace = read_workspace_map(path)
+    if workspace.stamp.content_sha256 == placement.provenance.source_sha256:
+        return workspace
+    message = f"{path}: not the map that {artefact} was made from"
+    if given is not None:
+        raise SettingsError(message)
+    logger.warning("%s, so it is drawn without one", message)
+    return None

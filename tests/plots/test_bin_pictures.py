@@ -1,0 +1,219 @@
+"""Pictures of the bin map show its attempts, its costs and its causes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.stats import binomtest
+from synthetic_maps import statuses, synthetic_bin_map, synthetic_placement
+
+from reachmap.cell.orientations import ConeFamily
+from reachmap.geometry import yaw_transform
+from reachmap.maps.records import Status
+from reachmap.plots.approach import STATUS_COLOURS, draw_approach, sunburst_sectors
+from reachmap.plots.bin_map import draw_costs, draw_reachability
+from reachmap.plots.bin_view import percent_after
+from reachmap.plots.placement import draw_placement, placement_words
+from reachmap.plots.saturation import draw_saturation, saturation_of, wilson_interval
+from reachmap.plots.squares import percent_text
+from reachmap.sampling.orientations import approach_directions, orientation_set
+
+CONE = ConeFamily(tilts_deg=(0.0, 30.0), azimuths=(1, 8), rolls=3)
+
+
+def test_first_and_last_panel_count_attempts() -> None:
+    """Fig. 6b: after one attempt on the left, after all on the right."""
+    found = np.zeros((1, 2, 3, 4, 5), bool)
+    found[0, 0, 0, :2, 0] = True
+    found[0, 0, 0, 2, 4] = True
+    bin_map = synthetic_bin_map(found)
+    figure = draw_reachability(bin_map)
+    first, last = figure.axes[:2]
+    assert "after 1 attempt · 8.33 % (2 of 24" in first.get_title(loc="left")
+    assert "after 5 attempts · 12.50 % (3 of 24" in last.get_title(loc="left")
+    place = (float(bin_map.x[0]), float(bin_map.y[0]))
+    for axes, expected in ((first, "50"), (last, "75")):
+        shown = {t.get_position(): t.get_text() for t in axes.texts}
+        assert shown[place] == expected
+
+
+def test_every_number_is_the_share_of_the_point() -> None:
+    """Against a loop over points."""
+    bin_map = synthetic_bin_map(0.6)
+    figure = draw_reachability(bin_map)
+    for attempts, axes in zip((1, 3), figure.axes, strict=False):
+        shown = {t.get_position(): t.get_text() for t in axes.texts}
+        for row, y in enumerate(bin_map.y):
+            for column, x in enumerate(bin_map.x):
+                tries = bin_map.path_found[0, row, column, :, :attempts]
+                share = 100.0 * np.mean([any(frame) for frame in tries])
+                assert shown[float(x), float(y)] == percent_text(share)
+
+
+def test_test_grasps_that_were_not_tried_do_not_count() -> None:
+    """A point where nothing was tried is a dash; elsewhere the rest counts."""
+    found = np.zeros((1, 1, 2, 4, 2), bool)
+    found[0, 0, 1, 0] = True
+    status = statuses(found.any(axis=-1))
+    status[0, 0, 0] = Status.NOT_ATTEMPTED
+    status[0, 0, 1, 3] = Status.NOT_ATTEMPTED
+    bin_map = synthetic_bin_map(found, status=status)
+    values = percent_after(bin_map, 2)
+    assert np.isnan(values[0, 0, 0])
+    assert values[0, 0, 1] == pytest.approx(100.0 / 3.0)
+    texts = [text.get_text() for text in draw_reachability(bin_map).axes[0].texts]
+    assert {"–", "33"} <= set(texts)
+
+
+def test_one_attempt_gives_one_panel() -> None:
+    """There is nothing to compare it with."""
+    bin_map = synthetic_bin_map(0.5, shape=(1, 3, 4, 5, 1))
+    assert len(draw_reachability(bin_map).axes) == 2
+
+
+def test_robot_is_where_the_pose_says() -> None:
+    """The arrow points from the bin to the origin of robot_base."""
+    for yaw in (0.0, 0.7, np.pi / 2, 3.0, -2.0):
+        bin_map = synthetic_bin_map(0.5, bin_pose=yaw_transform(0.5, 0.1, 0.0, yaw))
+        axes = draw_reachability(bin_map).axes[0]
+        arrow = next(p for p in axes.patches if type(p).__name__ == "FancyArrowPatch")
+        (start, end) = arrow._posA_posB
+        seen = np.subtract(end, start) / np.linalg.norm(np.subtract(end, start))
+        robot = -bin_map.bin_pose[:2, :2].T @ bin_map.bin_pose[:2, 3]
+        np.testing.assert_allclose(seen, robot / np.linalg.norm(robot), atol=1e-9)
+
+
+def test_costs_are_means_over_what_was_reached() -> None:
+    """First over successful attempts, then over the test grasps of a point."""
+    bin_map = synthetic_bin_map(0.4, shape=(1, 3, 4, 6, 3))
+    figure = draw_costs(bin_map)
+    panel = next(a for a in figure.axes if "Execution" in a.get_title(loc="left"))
+    shown = {t.get_position(): t.get_text() for t in panel.texts}
+    for row, y in enumerate(bin_map.y):
+        for column, x in enumerate(bin_map.x):
+            times = bin_map.execution_time[0, row, column]
+            means = [np.nanmean(t) for t in times if not np.isnan(t).all()]
+            expected = f"{np.mean(means):.2f}" if means else "–"
+            assert shown[float(x), float(y)] == expected
+
+
+def test_cost_j_is_drawn_where_it_is_finite() -> None:
+    """The fourth panel exists when the cost is given; unreachable is a dash."""
+    bin_map = synthetic_bin_map(0.9)
+    cost = np.full(bin_map.status.shape, np.inf)
+    cost[0, 0, 0, :2] = (0.5, 1.5)
+    panels = [a.get_title(loc="left") for a in draw_costs(bin_map, cost).axes]
+    assert any(title.startswith("Cost J · mean 1.00") for title in panels)
+    assert not any(
+        "Cost J" in a.get_title(loc="left") for a in draw_costs(bin_map).axes
+    )
+
+
+def test_nothing_reached_still_gives_pictures() -> None:
+    """An empty map is a result, and is drawn as one."""
+    bin_map = synthetic_bin_map(0.0)
+    titles = [a.get_title(loc="left") for a in draw_costs(bin_map).axes]
+    assert any("nothing reached" in title for title in titles)
+    draw_reachability(bin_map)
+    draw_approach(bin_map)
+    assert "0.00 % after" in draw_saturation(bin_map).texts[0].get_text()
+
+
+@pytest.mark.parametrize(("hits", "total"), [(0, 10), (10, 10), (6572, 7560), (1, 3)])
+def test_wilson_interval_is_that_of_scipy(hits: int, total: int) -> None:
+    """The same interval from another hand."""
+    low, high = wilson_interval(np.array([float(hits)]), np.array([float(total)]))
+    known = binomtest(hits, total).proportion_ci(method="wilson")
+    assert float(low[0]) == pytest.approx(known.low, abs=1e-12)
+    assert float(high[0]) == pytest.approx(known.high, abs=1e-12)
+
+
+def test_saturation_counts_what_the_first_attempts_reach() -> None:
+    """The curve rises, and the roadmap's share lies at or above its end."""
+    found = np.zeros((1, 1, 4, 5, 3), bool)
+    found[0, 0, 0, :, 0] = True
+    found[0, 0, 1, :, 1] = True
+    proved = found.any(axis=-1)
+    proved[0, 0, 2] = True
+    data = saturation_of(synthetic_bin_map(found, connected=proved))
+    np.testing.assert_allclose(data.share, [25.0, 50.0, 50.0])
+    assert data.proved == 75.0
+    assert data.total == 20
+    figure = draw_saturation(synthetic_bin_map(found, connected=proved))
+    texts = [text.get_text() for text in figure.axes[0].texts]
+    assert any("75.00 %" in text for text in texts)
+
+
+def test_sunburst_tiles_the_disc_once() -> None:
+    """Sectors do not overlap and leave no gap: their areas add up to π."""
+    directions = approach_directions(orientation_set(CONE), "+z")
+    sectors = sunburst_sectors(directions)
+    assert len(sectors) == 27
+    areas = [(s.outer**2 - s.inner**2) * (s.end - s.start) / 2.0 for s in sectors]
+    assert sum(areas) == pytest.approx(np.pi)
+    assert sum(sector.inner == 0.0 for sector in sectors) == 3
+    assert sum(sector.border for sector in sectors) == 8
+
+
+def test_sector_lies_on_the_side_the_tool_leans_to() -> None:
+    """A tool that points towards -x leans to +x: its sector is on the right."""
+    tilt = np.radians(30.0)
+    azimuths = np.arange(8) * np.pi / 4
+    directions = np.stack(
+        [np.sin(tilt) * np.cos(azimuths), np.sin(tilt) * np.sin(azimuths),
+         np.full(8, -np.cos(tilt))], axis=-1
+    )  # fmt: skip
+    for direction, sector in zip(directions, sunburst_sectors(directions), strict=True):
+        middle = (sector.start + sector.end) / 2.0
+        lean = -direction[:2] / np.linalg.norm(direction[:2])
+        np.testing.assert_allclose([np.cos(middle), np.sin(middle)], lean, atol=1e-9)
+
+
+def test_sunburst_of_arbitrary_directions_is_well_formed() -> None:
+    """Lists of orientations need not be cones."""
+    rng = np.random.default_rng(2)
+    directions = rng.normal(size=(17, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    for sector in sunburst_sectors(directions):
+        assert 0.0 <= sector.inner < sector.outer <= 1.0 + 1e-12
+        assert sector.end > sector.start
+        assert np.isfinite(sector.polygon()).all()
+
+
+def test_sunburst_colours_are_the_states() -> None:
+    """Each slice of each point has the colour of its test grasp."""
+    bin_map = synthetic_bin_map(0.5, shape=(1, 2, 3, 6, 2))
+    axes = draw_approach(bin_map).axes[0]
+    bursts = [c for c in axes.collections if type(c).__name__ == "PolyCollection"]
+    assert len(bursts) == 6
+    for burst, status in zip(bursts, bin_map.status[0].reshape(6, 6), strict=True):
+        expected = [STATUS_COLOURS[Status(int(code))].lstrip("#") for code in status]
+        shown = [bytes(np.rint(c[:3] * 255).astype("u1")).hex()
+                 for c in burst.get_facecolor()]  # fmt: skip
+        assert shown == expected
+
+
+def test_placement_words_tell_pose_and_scores() -> None:
+    """Title and subtitle carry the numbers of the chosen candidate."""
+    title, subtitle = placement_words(synthetic_placement())
+    assert title == "Bin at x = +0.500, y = +0.100, z = −0.050 m, yaw 86°"
+    assert subtitle == (
+        "score 96.5 % · worst point 70 % · runner-up 91.0 % · the paper's rule 88.2 %"
+    )
+
+
+def test_placement_shows_bins_where_they_would_stand() -> None:
+    """The chosen bin, the runner-up and the paper's choice, to scale."""
+    placement = synthetic_placement()
+    figure = draw_placement(placement)
+    axes = figure.axes[0]
+    drawn = [p for p in axes.patches if type(p).__name__ == "Polygon"]
+    centres = np.array([p.get_xy()[:-1].mean(axis=0) for p in drawn])
+    for index in (placement.chosen, placement.runner_up, placement.paper_choice):
+        distance = np.linalg.norm(centres - placement.candidate_pose[index, :2], axis=1)
+        assert distance.min() < 1e-9
+    labels = {text.get_text() for text in figure.legends[0].get_texts()}
+    assert {"runner-up", "the paper's rule", "robot base (origin)"} <= labels
+    words = " ".join(text.get_text() for text in figure.texts)
+    assert "+x 120 mm, −x 80 mm, +yaw 23°, −yaw 20°" in words
+    assert "1 the bin meets pedestal" in words
