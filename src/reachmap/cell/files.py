@@ -115,6 +115,13 @@ def compare_hashes(
             )
 
 
+def robot_text(path: Path, arguments: Mapping[str, str], resolver: Resolver) -> str:
+    """Text of a URDF or SRDF file, xacro expanded."""
+    if path.suffix == ".xacro":
+        return expand_xacro(path, arguments, resolver)
+    return read_text(path, limit=MAX_URDF_BYTES)
+
+
 def body_key(name: str, reference: str) -> str:
     """Key of a body's mesh in ``files_sha256``: the same on every machine."""
     return f"body {name}: {reference.rsplit('/', 1)[-1]}"
@@ -133,11 +140,7 @@ def _read_urdf(document: Document, files: CellFiles) -> None:
         return
     try:
         path, root = files.resolver.resolve_robot(reference)
-        if path.suffix == ".xacro":
-            arguments = _xacro_args(document)
-            files.urdf = expand_xacro(path, arguments, files.resolver)
-        else:
-            files.urdf = read_text(path, limit=MAX_URDF_BYTES)
+        files.urdf = robot_text(path, _xacro_args(document), files.resolver)
         files.urdf_folder, files.urdf_root = path.parent, root
         files.robot = parse_urdf(files.urdf, path.name)
     except (NotFoundError, CellError) as error:
@@ -161,10 +164,7 @@ def _read_srdf(document: Document, files: CellFiles) -> None:
         return
     try:
         path = files.resolver.resolve(reference)
-        if path.suffix == ".xacro":
-            files.srdf = expand_xacro(path, _xacro_args(document), files.resolver)
-        else:
-            files.srdf = read_text(path, limit=MAX_URDF_BYTES)
+        files.srdf = robot_text(path, _xacro_args(document), files.resolver)
         files.srdf_description = parse_srdf(files.srdf, path.name, files.robot)
     except (NotFoundError, CellError) as error:
         _add(document, location, error)

@@ -141,6 +141,7 @@ def cell_from_json(
     srdf: str = "",
     text: str = "",
     overrides: Sequence[str] = (),
+    changes: Sequence[str] = (),
     files_sha256: Mapping[str, str] | None = None,
     source: str = "artefact",
 ) -> LoadedCell:
@@ -155,6 +156,10 @@ def cell_from_json(
         ``cell_resolved_json``.
     urdf, srdf, text : str
         ``urdf``, ``srdf`` and ``cell_yaml``.
+    overrides : sequence of str
+        Those that are in ``resolved_json`` already.
+    changes : sequence of str
+        ``key.path=value`` to be made now; they join the overrides.
     files_sha256 : mapping, optional
         Mesh to expected sha256; not compared where omitted.
     source : str
@@ -165,7 +170,7 @@ def cell_from_json(
     CellError
         The JSON is no cell, or a mesh is missing or has changed.
     """
-    document, cell = stored_cell(resolved_json, source=source)
+    document, cell = stored_cell(resolved_json, source=source, changes=changes)
     files = stored_files(document, urdf=urdf, srdf=srdf)
     if files.robot is not None:
         check_names(document, files.robot, files.srdf_description)
@@ -176,7 +181,7 @@ def cell_from_json(
         source=source,
         directory=files.resolver.directory,
         text=text,
-        overrides=tuple(overrides),
+        overrides=(*overrides, *changes),
         resolved_json=cell.model_dump_json(),
         sha256=fingerprint(cell, urdf, srdf, files.files_sha256),
         urdf=urdf,
@@ -193,7 +198,9 @@ class StoredCell(NamedTuple):
     cell: Cell
 
 
-def stored_cell(resolved_json: str, *, source: str = "artefact") -> StoredCell:
+def stored_cell(
+    resolved_json: str, *, source: str = "artefact", changes: Sequence[str] = ()
+) -> StoredCell:
     """Validate the ``cell_resolved_json`` of an artefact; needs no other file.
 
     Raises
@@ -211,6 +218,7 @@ def stored_cell(resolved_json: str, *, source: str = "artefact") -> StoredCell:
         raise CellError(f"{source}: the cell is not JSON: {error}") from None
     if not isinstance(document.data, dict):
         raise CellError(f"{source}: the cell is not a JSON object")
+    apply_overrides(document, changes, Cell)
     cell = validated(document)
     document.raise_mistakes()
     if cell is None:

@@ -1,0 +1,97 @@
+"""``reachmap check``: load a cell and say what is in it."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import click
+
+from reachmap.cli.failures import RunState
+from reachmap.cli.options import cell_argument, json_option, set_option
+
+if TYPE_CHECKING:
+    from reachmap.tools.check import CellCheck
+
+
+@click.command()
+@cell_argument
+@set_option
+@json_option
+@click.pass_context
+def command(
+    ctx: click.Context, cell: str, overrides: tuple[str, ...], as_json: bool
+) -> None:
+    """Check a cell: joints, bodies, limits, scan configuration.
+
+    CELL is the name of a shipped cell or the path of a cell file. Nothing is planned.
+    With -v the collision pairs are listed. Exits with 2 if the cell is wrong or its
+    scan configuration cannot be taken; the joint or the two bodies are named.
+
+    Example: reachmap check my-cell.yaml --set bin.pose.xyz=[0.6,0,-0.1]
+    """
+    from reachmap.errors import SceneError
+    from reachmap.tools.check import check
+
+    answer = check(cell, overrides)
+    if as_json:
+        click.echo(json.dumps(dataclasses.asdict(answer)))
+    else:
+        state = ctx.find_object(RunState)
+        for line in _lines(answer, verbose=state is not None and state.verbosity > 0):
+            click.echo(line)
+    if answer.problems:
+        raise SceneError(f"{answer.source}: {line}" for line in answer.problems)
+
+
+def _lines(answer: CellCheck, *, verbose: bool) -> Iterator[str]:
+    """Lay the answer out for people."""
+    exact = "all branches" if answer.ik_complete else "not proved complete"
+    point = ", ".join(f"{v:.3f}" for v in answer.tcp_at_scan_m)
+    direction = ", ".join(f"{v:.3f}" for v in answer.approach_at_scan)
+    yield f"cell    {answer.name}  (sha256 {answer.sha256[:12]})"
+    yield f"robot   {answer.robot}"
+    yield f"base    {answer.base_frame}"
+    yield f"tcp     on {answer.tcp_parent}, approach {answer.approach_axis}"
+    yield f"        at the scan configuration ({point}) m, approaching ({direction})"
+    yield f"ik      {answer.ik_method}, {exact}"
+    yield ""
+    yield from _joint_table(answer)
+    yield ""
+    yield "bodies"
+    width = max(len(row.name) for row in answer.bodies)
+    for row in answer.bodies:
+        touch = f", may touch {', '.join(row.touch)}" if row.touch else ""
+        yield f"  {row.name:<{width}}  on {row.attach_to}: {row.shape}{touch}"
+    yield ""
+    left_out = f"{len(answer.proved_pairs)} more can never meet"
+    yield f"collision pairs  {len(answer.pairs)} checked, {left_out}"
+    if verbose:
+        yield from (f"  {pair}" for pair in answer.pairs)
+        yield from (f"  {pair} (never meet)" for pair in answer.proved_pairs)
+    yield (
+        f"resolution  planning step {answer.planning_step_rad:g} rad, verification "
+        f"{answer.verification_distance_m * 1e3:g} mm, margin "
+        f"{answer.safety_margin_m * 1e3:g} mm"
+    )
+    frames, grasps = f"{answer.test_frames:,}", f"{answer.test_grasps:,}"
+    yield f"scans   {frames} test frames, {grasps} test grasps"
+    yield from (f"warning: {warning}" for warning in answer.warnings)
+    yield f"scan configuration  {'INVALID' if answer.problems else 'valid'}"
+    yield from (f"  {problem}" for problem in answer.problems)
+
+
+def _joint_table(answer: CellCheck) -> Iterator[str]:
+    width = max(len("joint"), *(len(row.name) for row in answer.joints))
+    yield (
+        f"{'joint':<{width}}  unit     lower     upper  velocity/s  "
+        f"acceleration/s²      scan"
+    )
+    for row in answer.joints:
+        mark = "" if row.within_limits else "  outside its limits"
+        yield (
+            f"{row.name:<{width}}  {row.unit:<4} {row.lower:>9.4g} {row.upper:>9.4g}  "
+            f"{row.velocity:>10.4g}  {row.acceleration:>15.4g} {row.scan:>9.4g}{mark}"
+        )

@@ -1,0 +1,253 @@
+"""A commented starter cell for a robot of which only the URDF is known."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from reachmap.cell.urdf import UrdfDescription, UrdfJoint
+from reachmap.cell.yaml_writer import scalar
+from reachmap.errors import SettingsError
+
+# Names that tool flanges have in published robot descriptions, best first.
+TIP_NAMES = ("tool0", "tcp", "flange", "hand_tcp", "ee_link", "end_effector", "tool")
+SEVEN_AXES = 7
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StarterChoices:
+    """What was guessed or chosen for the starter cell.
+
+    Attributes
+    ----------
+    urdf, srdf : str
+        References as they are written; srdf may be "".
+    base, tip : str
+        Links.
+    joints : tuple of UrdfJoint
+        Joints that move, base first.
+    locked : dict
+        Other moving joints to their positions [deg or m].
+    reach_m : float
+        How far the TCP gets from the base axis.
+    scan_deg : dict
+        Joint to position in the scan configuration [deg or m].
+    """
+
+    name: str
+    urdf: str
+    srdf: str = ""
+    base: str
+    root: str
+    tip: str
+    joints: tuple[UrdfJoint, ...]
+    locked: Mapping[str, float] = field(default_factory=dict)
+    reach_m: float = 1.0
+    scan_deg: Mapping[str, float] = field(default_factory=dict)
+
+
+def guess_base(robot: UrdfDescription) -> str:
+    """Link to measure from: the root, or what a root named world carries."""
+    below = [j for j in robot.joints.values() if j.parent == robot.root]
+    if robot.root == "world" and len(below) == 1 and below[0].type == "fixed":
+        return below[0].child
+    return robot.root
+
+
+def guess_tip(robot: UrdfDescription, base: str) -> str:
+    """Link to carry the tool: a well-known name, else the end of the longest chain.
+
+    Raises
+    ------
+    SettingsError
+        No joint moves.
+    """
+
+    def rank(link: str) -> tuple[int, int]:
+        turning = [
+            name for name in robot.chain(base, link) if _turns(robot.joints[name])
+        ]
+        known = [k for k, name in enumerate(TIP_NAMES) if link.lower().endswith(name)]
+        return (len(turning), -min(known, default=len(TIP_NAMES)))
+
+    tip = max(robot.links, key=rank)
+    if not robot.chain(base, tip):
+        raise SettingsError(f"{robot.name}: the URDF has no joint that moves")
+    return tip
+
+
+def middle_position(joint: UrdfJoint) -> float:
+    """Zero if the joint may be there, else the middle of its range [rad or m]."""
+    low, high = joint.lower, joint.upper
+    if low is None or high is None or low < 0.0 < high:
+        return 0.0
+    return (low + high) / 2.0
+
+
+def user_value(joint: UrdfJoint, value: float) -> float:
+    """Position in the unit of the cell file: degrees, or metres if prismatic."""
+    return math.degrees(value) if _turns(joint) else value
+
+
+def cell_name(text: str) -> str:
+    """Name of a cell made from any text: letters, digits, dots and dashes."""
+    return re.sub(r"[^A-Za-z0-9.]+", "-", text).strip("-.")[:60] or "my-cell"
+
+
+def starter_text(choices: StarterChoices) -> str:
+    """YAML text with a comment at everything that was guessed."""
+    parts = [
+        _head(choices),
+        _robot(choices),
+        _surroundings(choices),
+        _scan(choices),
+        _scans(choices),
+    ]
+    return "\n".join(parts)
+
+
+def _turns(joint: UrdfJoint) -> bool:
+    return joint.type != "prismatic"
+
+
+def _head(c: StarterChoices) -> str:
+    return f"""\
+# Starter cell for {c.name}, written by reachmap new-cell. Lengths in metres, angles in
+# degrees. Lines marked GUESS were not known: put your own numbers there.
+# `reachmap check THIS_FILE` says what is wrong with it.
+format: reachmap.cell
+format_version: "1.0"
+name: {scalar(c.name)}
+description: {scalar(f"{c.name} with a bin in front of it")}
+"""
+
+
+def _robot(c: StarterChoices) -> str:
+    lines = ["robot:", f"  urdf: {scalar(c.urdf)}"]
+    if c.srdf:
+        lines.append(
+            "  # Pairs of links that touch in every position are disabled here."
+        )
+        lines.append(f"  srdf: {scalar(c.srdf)}")
+    else:
+        lines.append(
+            "  # srdf: robot.srdf       # MoveIt's disabled collisions, if any"
+        )
+    if c.base != c.root:
+        lines.append(f"  base_frame: {scalar(c.base)}")
+    lines += [
+        "  # GUESS: the link that carries the tool, the tool centre point in its frame,",
+        "  # and the axis of the tool centre point that points into the object.",
+        f"  tcp: {{parent: {scalar(c.tip)}, xyz: [0, 0, 0], "
+        f'approach_axis: "{approach_axis(c.tip)}"}}',
+    ]
+    names = ", ".join(joint.name for joint in c.joints)
+    lines.append(f"  # Joints that move: {names}.")
+    if c.locked:
+        lines.append("  # Joints that stay where they are [deg, or m if they slide].")
+        lines.append(f"  locked_joints_deg: {scalar(dict(c.locked))}")
+    lines += _limits(c)
+    if len(c.joints) == SEVEN_AXES and all(map(_turns, c.joints)):
+        lines += [
+            "  # With seven joints, inverse kinematics samples one of them on a grid.",
+            f"  ik: {{redundant_joint: {scalar(c.joints[-1].name)}}}",
+        ]
+    return "\n".join(lines) + "\n"
+
+
+def approach_axis(tip: str) -> str:
+    """Approach axis of a link by its name: x for the old ROS ee_link, else z."""
+    return "+x" if tip.lower().endswith("ee_link") else "+z"
+
+
+def _limits(c: StarterChoices) -> list[str]:
+    slow = [j.name for j in c.joints if not j.velocity or j.velocity <= 0]
+    unbounded = [j.name for j in c.joints if j.lower is None or j.upper is None]
+    lines = ["  limits:"]
+    if slow:
+        lines.append("    # GUESS: the URDF has no velocity for these joints.")
+        lines.append(f"    velocity_rad_s: {scalar(dict.fromkeys(slow, 1.0))}")
+    else:
+        lines.append("    # Velocities are those of the URDF; tighten them here.")
+        lines.append("    # velocity_rad_s: 2.0")
+    lines.append("    acceleration_rad_s2: 5.0   # GUESS: a URDF cannot hold them")
+    if unbounded:
+        table = {name: [-180.0, 180.0] for name in unbounded}
+        lines.append("    # GUESS: these joints turn without end in the URDF.")
+        lines.append(f"    position_deg: {scalar(table)}")
+    return lines
+
+
+def _bin_numbers(c: StarterChoices) -> tuple[list[float], list[float], float]:
+    """Inner size and position of the bin, and the largest approach [m]."""
+    size = min(1.0, max(0.1, c.reach_m / 0.9))
+    inner = [round(side * size, 3) for side in (0.36, 0.26, 0.15)]
+    return inner, [round(0.6 * c.reach_m, 3), 0.0, 0.0], round(0.05 * size, 3)
+
+
+def _surroundings(c: StarterChoices) -> str:
+    inner, position, _ = _bin_numbers(c)
+    return f"""\
+# camera:                      # the optical frame: z into the scene, x to the right
+#   parent: {c.tip}
+#   xyz: [0, -0.1, 0.05]
+#   range_m: [0.5, 0.6]
+#   field_of_view_deg: [57, 36]
+bodies: []                     # everything solid that is not in the URDF, such as
+#  - name: gripper
+#    attach_to: {c.tip}
+#    shape: {{cylinder: {{radius: 0.015, length: 0.1}}}}
+#    pose: {{xyz: [0, 0, 0.05]}}   # centre of the shape
+#    touch: [{c.tip}]
+#  - name: table
+#    attach_to: world
+#    shape: {{box: [1.5, 1.5, 0.05]}}
+#    pose: {{xyz: [0, 0, -0.027]}}
+#    touch: [{c.base}, bin]
+bin:                           # GUESS; `reachmap place-bin` finds a good place
+  inner: {scalar(inner)}
+  wall: 0.005
+  pose: {{xyz: {scalar(position)}, rpy_deg: [0, 0, 90]}}
+"""
+
+
+def _scan(c: StarterChoices) -> str:
+    lines = [
+        "# GUESS: where the camera looks at the bin from, and where every path starts.",
+        "scan_configuration:",
+        "  q_deg:",
+        *(
+            f"    {scalar(joint.name)}: {scalar(c.scan_deg[joint.name])}"
+            for joint in c.joints
+        ),
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _scans(c: StarterChoices) -> str:
+    reach = max(0.05, math.ceil(c.reach_m * 20) / 20)
+    inner, _, _ = _bin_numbers(c)
+    cone = "{family: cone, tilts_deg: [0, 30], azimuths: [1, 8], rolls: 3}"
+    low, high = round(-0.4 * reach, 3), round(0.6 * reach, 3)
+    side = round(0.85 * reach, 3)
+    left = round(-0.1 * reach, 3)
+    right_min, right_max = scalar([left, -side, low]), scalar([reach, 0, high])
+    left_min, left_max = scalar([left, 0, low]), scalar([reach, side, high])
+    return f"""\
+workspace_scan:
+  cubes:                       # on either side of y = 0, which they share
+    - {{name: right, min: {right_min}, max: {right_max}, grid: [11, 6]}}
+    - {{name: left, min: {left_min}, max: {left_max}, grid: [11, 6]}}
+  z_step: {scalar(round((high - low) / 10, 4))}
+  orientations: {cone}
+  repeats: 5
+bin_scan:
+  grid: [20, 14]
+  layers: [{scalar(round(inner[2] / 3, 3))}]               # heights above the bottom
+  orientations: {cone}
+  repeats: 5
+  approach_distance_m: 0.0     # straight way before the grasp; 0: plan to the grasp
+seed: 1
+"""

@@ -1,0 +1,218 @@
+"""``reachmap check``: what a cell is made of, and whether it can work."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from reachmap._typing import FloatArray
+from reachmap.cell.fields import Shape
+from reachmap.cell.loading import LoadedCell, read_cell
+from reachmap.core.scene import Scene
+from reachmap.geometry import AXES
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JointRow:
+    """One joint that moves. Unit: deg for a turning joint, m for a sliding one.
+
+    Velocity and acceleration are per second and with the cell's scaling.
+    """
+
+    name: str
+    unit: str
+    lower: float
+    upper: float
+    velocity: float
+    acceleration: float
+    scan: float
+    within_limits: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BodyRow:
+    """One body that is not in the URDF."""
+
+    name: str
+    attach_to: str
+    shape: str
+    touch: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CellCheck:
+    """What ``reachmap check`` says.
+
+    Attributes
+    ----------
+    tcp_at_scan_m : tuple of float
+        TCP in robot_base at the scan configuration [m].
+    approach_at_scan : tuple of float
+        Approach direction there, unit vector in robot_base.
+    ik_method, ik_complete : str, bool
+        How inverse kinematics is solved, and whether "no solution" is a proof.
+    pairs : tuple of str
+        ``"A | B"`` that are checked for collision.
+    proved_pairs : tuple of str
+        Pairs left out because they were proved never to meet.
+    test_frames, test_grasps : int
+        Sizes of the two scans.
+    problems : tuple of str
+        Why the scan configuration cannot be taken; empty where it can.
+    """
+
+    name: str
+    source: str
+    sha256: str
+    robot: str
+    base_frame: str
+    tcp_parent: str
+    approach_axis: str
+    tcp_at_scan_m: tuple[float, ...]
+    approach_at_scan: tuple[float, ...]
+    ik_method: str
+    ik_complete: bool
+    joints: tuple[JointRow, ...]
+    bodies: tuple[BodyRow, ...]
+    pairs: tuple[str, ...]
+    proved_pairs: tuple[str, ...]
+    planning_step_rad: float
+    verification_distance_m: float
+    safety_margin_m: float
+    test_frames: int
+    test_grasps: int
+    warnings: tuple[str, ...]
+    problems: tuple[str, ...]
+
+
+def check(name_or_path: str, overrides: Sequence[str] = ()) -> CellCheck:
+    """Load a cell, build its scene with the bin, and test the scan configuration.
+
+    Parameters
+    ----------
+    name_or_path : str
+    overrides : sequence of str
+        ``--set`` assignments.
+
+    Raises
+    ------
+    CellError, SceneError
+        The cell cannot be loaded or its scene cannot be built. A scan configuration
+        that cannot be taken is in ``problems`` instead.
+    """
+    return check_loaded(read_cell(name_or_path, overrides))
+
+
+def check_loaded(loaded: LoadedCell) -> CellCheck:
+    """Check a cell that is loaded already, see :func:`check`."""
+    scene = Scene.build(loaded)
+    cell, robot = loaded.cell, scene.robot
+    T_base_tcp = scene.kinematics.forward(scene.scan_configuration)
+    column, sign = AXES[cell.robot.tcp.approach_axis]
+    return CellCheck(
+        name=cell.name,
+        source=loaded.source,
+        sha256=loaded.sha256,
+        robot=cell.robot.urdf,
+        base_frame=robot.base_frame,
+        tcp_parent=cell.robot.tcp.parent,
+        approach_axis=cell.robot.tcp.approach_axis,
+        tcp_at_scan_m=_rounded(T_base_tcp[:3, 3]),
+        approach_at_scan=_rounded(sign * T_base_tcp[:3, column]),
+        ik_method=scene.kinematics.method,
+        ik_complete=scene.kinematics.complete,
+        joints=_joints(scene),
+        bodies=_bodies(loaded),
+        pairs=scene.checker.body_pairs,
+        proved_pairs=scene.checker.proved_pairs,
+        planning_step_rad=cell.collision.planning_step_rad,
+        verification_distance_m=cell.collision.verification_distance_m,
+        safety_margin_m=cell.collision.safety_margin_m,
+        test_frames=cell.workspace_scan.count(),
+        test_grasps=cell.bin_scan.count(),
+        warnings=loaded.warnings,
+        problems=scan_problems(scene),
+    )
+
+
+def scan_problems(scene: Scene) -> tuple[str, ...]:
+    """Say why the scan configuration cannot be taken: limits, bodies that touch."""
+    q = scene.scan_configuration
+    robot = scene.robot
+    problems = []
+    for name in robot.outside_limits(q):
+        k = robot.joint_names.index(name)
+        factor, unit = (180.0 / np.pi, "deg") if robot.is_revolute[k] else (1.0, "m")
+        value, low, high = (
+            factor * row[k] for row in (q, robot.lower_rad, robot.upper_rad)
+        )
+        problems.append(
+            f"scan_configuration: {name} = {value:.6g} {unit} is outside its limits "
+            f"[{low:.6g}, {high:.6g}]"
+        )
+    for index in scene.checker.touching_pairs(q):
+        first, second = scene.checker.body_pairs[index].split(" | ")
+        problems.append(f"scan_configuration: {first} touches {second}")
+    return tuple(problems)
+
+
+def shape_text(shape: Shape) -> str:
+    """Shape with its size: ``box 0.24 × 0.24 × 0.8 m``."""
+    kind, value = shape.kind()
+    if kind == "box":
+        return "box " + " × ".join(f"{side:g}" for side in value) + " m"
+    if kind == "sphere":
+        return f"sphere r {value.radius:g} m"
+    if kind == "mesh":
+        return f"mesh {value.file.rsplit('/', 1)[-1]}"
+    return f"{kind} r {value.radius:g} m, length {value.length:g} m"
+
+
+def _joints(scene: Scene) -> tuple[JointRow, ...]:
+    robot, q = scene.robot, scene.scan_configuration
+    outside = robot.outside_limits(q)
+    rows = []
+    for k, name in enumerate(robot.joint_names):
+        factor = 180.0 / np.pi if robot.is_revolute[k] else 1.0
+        rows.append(
+            JointRow(
+                name=name,
+                unit="deg" if robot.is_revolute[k] else "m",
+                lower=float(factor * robot.lower_rad[k]),
+                upper=float(factor * robot.upper_rad[k]),
+                velocity=float(factor * robot.velocity_rad_s[k]),
+                acceleration=float(factor * robot.acceleration_rad_s2[k]),
+                scan=float(factor * q[k]),
+                within_limits=name not in outside,
+            )
+        )
+    return tuple(rows)
+
+
+def _bodies(loaded: LoadedCell) -> tuple[BodyRow, ...]:
+    rows = [
+        BodyRow(
+            name=body.name,
+            attach_to=body.attach_to,
+            shape=shape_text(body.shape),
+            touch=body.touch,
+        )
+        for body in loaded.cell.bodies
+    ]
+    inner = " × ".join(f"{side:g}" for side in loaded.cell.bin.inner)
+    rows.append(
+        BodyRow(
+            name="bin",
+            attach_to="robot_base",
+            shape=f"inside {inner} m, wall {loaded.cell.bin.wall:g} m",
+            touch=loaded.cell.bin.touch,
+        )
+    )
+    return tuple(rows)
+
+
+def _rounded(values: FloatArray) -> tuple[float, ...]:
+    # Adding 0.0 turns -0.0 into 0.0, which reads better.
+    return tuple(float(v) + 0.0 for v in np.round(values, 6))
