@@ -59,6 +59,7 @@ def make_bin_map(
     causes = np.array([Status.NO_IK, Status.IK_IN_COLLISION, Status.NO_PATH_FOUND])
     status = np.where(can, Status.PATH_FOUND, rng.choice(causes, grid)).astype(np.uint8)
     pair = rng.integers(0, len(BODY_PAIRS), grid)
+    sought = np.isin(status, (Status.PATH_FOUND, Status.NO_PATH_FOUND))
     blocking = np.where(status == Status.IK_IN_COLLISION, pair, -1).astype(np.int16)
 
     def measured(low: float, high: float) -> np.ndarray:
@@ -77,17 +78,17 @@ def make_bin_map(
         "status": status,
         "blocking_pair": blocking,
         "n_ik": np.where(status == Status.NO_IK, 0, 4).astype(np.uint8),
-        "n_ik_free": np.where(can, 2, 0).astype(np.uint8),
+        "n_ik_free": np.where(sought, 2, 0).astype(np.uint8),
         "connected": can.astype(np.uint8),
         "path_found": found.astype(np.uint8),
         "path_length": measured(1.0, 6.0),
-        "path_length_total": measured(1.0, 6.0),
+        "path_length_planned": measured(1.0, 6.0),
         "tcp_path_length": measured(0.3, 2.0),
         "planning_time": measured(0.01, 0.2),
         "planning_cpu_time": measured(0.01, 0.2),
         "simplification_time": measured(0.001, 0.01),
         "execution_time": measured(0.5, 3.0),
-        "goal_configuration": np.full((*grid, 6), np.nan),
+        "goal_configuration": np.where(can[..., None], np.zeros(6), np.nan),
         "path_reachability": 100.0 * can.mean(axis=-1),
         "scan_configuration": np.zeros(6),
         "joint_names": tuple(f"joint_{i}" for i in range(6)),

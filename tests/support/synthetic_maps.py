@@ -290,7 +290,7 @@ def _path_values(
         paths.configuration, paths.row_size, paths.planned_size
     )
     place = tuple(paths.index.T)
-    lengths = {"path_length": planned, "path_length_total": whole}
+    lengths = {"path_length": whole, "path_length_planned": planned}
     values = {}
     for name, length in lengths.items():
         values[name] = np.full(found.shape, np.nan)

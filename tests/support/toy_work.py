@@ -19,9 +19,6 @@ from pathlib import Path
 import numpy as np
 
 from reachmap.errors import ReachmapError, SceneError
-from reachmap.maps.records import Status
-from reachmap.scans.progress import Progress
-from reachmap.scans.run import run_scan
 from reachmap.scans.work import KINDS, Kind, Work
 
 
@@ -138,6 +135,8 @@ def toy_work(toy=None, **changes):
 
 def expected(toy=None, *, failed=(), **changes):
     """The artefact computed without any of the machinery."""
+    from reachmap.maps import Status
+
     toy = dataclasses.replace(toy or Toy(), **changes)
     clean = dataclasses.replace(toy, poison=(), moody=(), buggy=(), wrong=(), pause_s=0)
     payloads = [
@@ -149,6 +148,9 @@ def expected(toy=None, *, failed=(), **changes):
 
 def main():
     """Run a toy as a command."""
+    from reachmap.scans.progress import Progress
+    from reachmap.scans.run import run_scan
+
     parser = argparse.ArgumentParser()
     parser.add_argument("output", type=Path)
     parser.add_argument("--toy", default="{}")

@@ -42,11 +42,11 @@ class Connection:
     ----------
     roadmap : Roadmap
     component : int array, shape (goals,)
-        0 for goals reached by exploring from the scan configuration, k for the k-th
-        component that was planned to, -1 for goals that were not needed.
+        Component of each goal: 0 was explored from the scan configuration, the others
+        from where a plan arrived, or were not reached; -1 for goals not needed.
     attempts, paths_found : int array, shape (components,)
-        Attempts of the planner; a component joined without it has none and
-        counts one path found.
+        Attempts at joining each component to the scan configuration, by a plan or a
+        straight motion, and whether one succeeded.
     """
 
     roadmap: Roadmap
@@ -82,97 +82,83 @@ def connect(
     roadmap = Roadmap.of(start, goals, frame)
     motions = planner.motions
     candidates = CandidateMotions.of(roadmap.goal_array, motions.checker.reach_m)
-    explorer = Explorer(roadmap, candidates, motions)
-    explorer.explore(START, START, 0.0)
-    plan_outwards(explorer, roadmap, planner, attempts=attempts, seed=seed)
-    connector = _Connector(
-        roadmap, planner, components_of_open_goals(roadmap, candidates, motions), seed
-    )
-    connector.run(attempts)
-    return Connection(
-        roadmap=roadmap,
-        component=connector.labels(),
-        attempts=connector.attempts,
-        paths_found=connector.paths_found,
-    )
-
-
-def plan_outwards(
-    explorer: Explorer, roadmap: Roadmap, planner: Planner, *, attempts: int, seed: int
-) -> int:
-    """Plan to goals spread over all that is open, and explore from what is reached.
-
-    Ends after ``attempts`` failures in a row; returns the number of plans made.
-    """
-    Q, failures, plans = roadmap.goal_array, 0, 0
-    while failures < attempts:
-        nodes = np.flatnonzero(roadmap.open_goals())
-        if not len(nodes):
-            break
-        rng = np.random.default_rng([seed, plans])
-        plans += 1
-        if len(nodes) > GOALS_PER_ATTEMPT:
-            nodes = np.sort(rng.choice(nodes, GOALS_PER_ATTEMPT, replace=False))
-        result = planner.plan(
-            Q[START], Q[nodes], int(rng.integers(1, 2**31)), max_checks=CHECKS_LARGE
-        )
-        if result.path is None:
-            failures += 1
-            continue
-        failures = 0
-        node = int(nodes[result.goal])
-        roadmap.add_path(result.path, START, node)
-        explorer.explore(node, START, path_length_rad(result.path))
-    return plans
+    connector = _Connector(roadmap, planner, seed)
+    connector.explore(Explorer(roadmap, candidates, motions), attempts)
+    connector.connect(components_of_open_goals(roadmap, candidates, motions), attempts)
+    return connector.connection()
 
 
 class _Connector:
-    """Component k (from 1) is ``components[k - 1]``; 0 is what was explored."""
+    """Collects components, as sets of nodes, with what it took to join them."""
 
-    def __init__(
-        self, roadmap: Roadmap, planner: Planner, components: list[IntArray], seed: int
-    ) -> None:
+    def __init__(self, roadmap: Roadmap, planner: Planner, seed: int) -> None:
         self._roadmap, self._planner, self._seed = roadmap, planner, seed
         self._Q = roadmap.goal_array
         self._weight = planner.motions.checker.reach_m
-        self._explored = roadmap.reached.copy()
-        self._components = components
-        self.attempts = np.zeros(len(components) + 1, np.int64)
-        self.paths_found = np.zeros(len(components) + 1, np.int64)
-        self.paths_found[0] = 1
+        self._components: list[IntArray] = []
+        self._attempts: list[int] = []
         self._tree: cKDTree | None = None
 
-    def run(self, attempts: int) -> None:
+    def explore(self, explorer: Explorer, attempts: int) -> None:
+        """Explore from the start, then from wherever plans arrive.
+
+        Plans go to goals spread over all that is open, until ``attempts`` of them
+        fail in a row.
+        """
+        self._components.append(explorer.explore(START, START, 0.0))
+        self._attempts.append(1)
+        failures = plans = 0
+        while failures < attempts:
+            nodes = np.flatnonzero(self._roadmap.open_goals())
+            if not len(nodes):
+                break
+            found = self._plan(START, nodes, (0, plans), CHECKS_LARGE)
+            plans += 1
+            failures += 1
+            if found is not None:
+                node, length_rad = found
+                self._components.append(explorer.explore(node, START, length_rad))
+                self._attempts.append(failures)
+                failures = 0
+
+    def connect(self, components: list[IntArray], attempts: int) -> None:
         """Plan to each component; afterwards look once more at what lies near."""
-        for label in self._unreached():
-            self._connect(label, attempts)
-        for label in self._unreached():
-            self._join_straight(label)
+        first = len(self._components)
+        self._components += components
+        self._attempts += [0] * len(components)
+        for label in range(first, len(self._components)):
+            if self._roadmap.open_goals()[self._components[label]].any():
+                self._connect(label, attempts)
+        for label in range(first, len(self._components)):
+            if not self._is_reached(label):
+                self._join_straight(label)
 
-    def labels(self) -> IntArray:
-        """Component of each goal, shape (goals,)."""
+    def connection(self) -> Connection:
+        """Sum up."""
         component = np.full(len(self._Q), -1, np.int64)
-        component[self._explored] = 0
-        for label, members in enumerate(self._components, start=1):
+        for label, members in enumerate(self._components):
             component[members] = label
-        return component[1:]
+        reached = [self._is_reached(k) for k in range(len(self._components))]
+        return Connection(
+            roadmap=self._roadmap,
+            component=component[1:],
+            attempts=np.array(self._attempts, np.int64),
+            paths_found=np.array(reached, np.int64),
+        )
 
-    def _unreached(self) -> list[int]:
-        return [
-            label
-            for label, members in enumerate(self._components, start=1)
-            if not self._roadmap.reached[members[0]]
-        ]
+    def _is_reached(self, label: int) -> bool:
+        return bool(self._roadmap.reached[self._components[label][0]])
 
     def _connect(self, label: int, attempts: int) -> None:
-        if not self._roadmap.open_goals()[self._components[label - 1]].any():
-            return
         if self._join_straight(label):
             return
-        small = len(self._components[label - 1]) < SMALL_COMPONENT
+        members = self._components[label]
+        budget = CHECKS_SMALL if len(members) < SMALL_COMPONENT else CHECKS_LARGE
         for attempt in range(attempts):
-            self.attempts[label] += 1
-            if self._plan(label, attempt, CHECKS_SMALL if small else CHECKS_LARGE):
+            self._attempts[label] += 1
+            start = START if attempt % 2 else int(self._nearest_pairs(label)[1][0])
+            if self._plan(start, members, (label, attempt), budget) is not None:
+                self._accept(label)
                 return
 
     def _join_straight(self, label: int) -> bool:
@@ -180,31 +166,32 @@ class _Connector:
             self._roadmap.motions_checked += 1
             if self._planner.motions.is_verified(self._Q[node], self._Q[goal]):
                 self._roadmap.edges.append((int(node), int(goal)))
+                self._attempts[label] += 1
                 self._accept(label)
                 return True
         return False
 
-    def _plan(self, label: int, attempt: int, budget: int) -> bool:
-        rng = np.random.default_rng([self._seed, label, attempt])
-        members = self._components[label - 1]
-        if len(members) > GOALS_PER_ATTEMPT:
-            members = np.sort(rng.choice(members, GOALS_PER_ATTEMPT, replace=False))
-        start = START if attempt % 2 else int(self._nearest_pairs(label)[1][0])
+    def _plan(
+        self, start: int, nodes: IntArray, key: tuple[int, int], budget: int
+    ) -> tuple[int, float] | None:
+        """Plan to some of the nodes; the one reached, and the length of the path."""
+        rng = np.random.default_rng([self._seed, *key])
+        if len(nodes) > GOALS_PER_ATTEMPT:
+            nodes = np.sort(rng.choice(nodes, GOALS_PER_ATTEMPT, replace=False))
         result = self._planner.plan(
             self._Q[start],
-            self._Q[members],
+            self._Q[nodes],
             int(rng.integers(1, 2**31)),
             max_checks=budget,
         )
         if result.path is None:
-            return False
-        self._roadmap.add_path(result.path, start, int(members[result.goal]))
-        self._accept(label)
-        return True
+            return None
+        node = int(nodes[result.goal])
+        self._roadmap.add_path(result.path, start, node)
+        return node, path_length_rad(result.path)
 
     def _accept(self, label: int) -> None:
-        self.paths_found[label] = 1
-        self._roadmap.reached[self._components[label - 1]] = True
+        self._roadmap.reached[self._components[label]] = True
         self._tree = None
 
     def _nearest_pairs(self, label: int) -> tuple[IntArray, IntArray]:
@@ -212,7 +199,7 @@ class _Connector:
         reached = np.flatnonzero(self._roadmap.reached)
         if self._tree is None:
             self._tree = cKDTree(self._Q[reached] * self._weight)
-        members = self._components[label - 1]
+        members = self._components[label]
         distance, row = self._tree.query(self._Q[members] * self._weight)
         order = np.argsort(distance, kind="stable")[:STRAIGHT_TRIES]
         return members[order], reached[row[order]]

@@ -236,7 +236,7 @@ class Explorer:
         self._near = candidates.node.tolist()
         self._length = candidates.length_rad.tolist()
 
-    def explore(self, node: int, before: int, length_rad: float) -> None:
+    def explore(self, node: int, before: int, length_rad: float) -> IntArray:
         """Go on from a node that is connected to an earlier one by some path.
 
         Parameters
@@ -245,9 +245,15 @@ class Explorer:
             Both :data:`START` to begin with.
         length_rad : float
             Of the path between them.
+
+        Returns
+        -------
+        int array
+            Nodes reached, the first one included.
         """
         start = 0.0 if node == before else self._distance[before] + length_rad
         self._reach(node, start)
+        group = [node]
         pending = self._motions_from(node)
         roadmap = self._roadmap
         while pending:
@@ -259,8 +265,10 @@ class Explorer:
                 continue
             roadmap.edges.append((before, node))
             self._reach(node, distance)
+            group.append(node)
             for motion in self._motions_from(node):
                 heapq.heappush(pending, motion)
+        return np.array(group, np.int64)
 
     def _reach(self, node: int, distance: float) -> None:
         self._roadmap.reached[node] = True

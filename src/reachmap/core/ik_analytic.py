@@ -82,7 +82,9 @@ class EaikRows:
         found = [solve(pose).Q for pose in T]
         counts = [len(rows) for rows in found]
         frame = np.repeat(np.arange(len(T)), counts)
-        Q = np.concatenate([np.zeros((0, self._dof)), *found])
+        # Without solutions EAIK's array may lack columns as well as rows.
+        some = [rows for rows in found if len(rows)]
+        Q = np.concatenate([np.zeros((0, self._dof)), *some])
         finite = np.isfinite(Q).all(axis=1)
         return Q[finite], frame[finite]
 
@@ -99,9 +101,15 @@ class EaikRows:
         return known and "Unknown" not in self.family
 
 
-def can_use_eaik(chain: SerialChain, fixed: Sequence[tuple[int, float]] = ()) -> bool:
+def can_use_eaik(
+    chain: SerialChain,
+    fixed: Sequence[tuple[int, float]] = (),
+    *,
+    within_rad: float = 1e-6,
+) -> bool:
     """Whether EAIK solves this arm: known structure, and it passes a self-test.
 
+    In the self-test EAIK finds random configurations within `within_rad`.
     The rank is tested before EAIK sees the arm: four parallel axes, for example,
     end the process with a segmentation fault.
     """
@@ -122,7 +130,7 @@ def can_use_eaik(chain: SerialChain, fixed: Sequence[tuple[int, float]] = ()) ->
         return False
     Q_found, frame = rows(T)
     differs = angular_distance(Q_found - Q[frame], chain.is_revolute).max(axis=1)
-    return bool(np.isin(np.arange(len(Q)), frame[differs < 1e-6]).all())
+    return bool(np.isin(np.arange(len(Q)), frame[differs < within_rad]).all())
 
 
 class AnalyticSolver:

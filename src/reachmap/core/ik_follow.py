@@ -54,13 +54,16 @@ class Follower:
             move by more than `largest_step_rad` (the branch ends or turns over).
         """
         q = np.array(q_start, float)
+        change = np.zeros_like(q)
         found = np.empty((len(T), len(q)))
         for k, pose in enumerate(T):
             goal = self._root_base * pin.SE3(np.asarray(pose, float))
-            q_next = self._meet(q, goal, tolerance, largest_step_rad)
-            if q_next is None:
+            # Joints go on as they went: one step less to the goal.
+            met = self._meet(q + change, goal, tolerance, largest_step_rad)
+            if met is None or np.abs(met - q).max() > largest_step_rad:
                 return None
-            found[k] = q = q_next
+            change = met - q if k else change
+            found[k] = q = met
         return found
 
     def _meet(

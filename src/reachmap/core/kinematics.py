@@ -12,6 +12,7 @@ from reachmap.cell.model import IkSpec
 from reachmap.core.chain import SerialChain
 from reachmap.core.ik_analytic import AnalyticSolver, can_use_eaik
 from reachmap.core.ik_follow import Follower
+from reachmap.core.ik_nominal import NominalSolver, nominal_chain
 from reachmap.core.ik_numeric import NumericSolver
 from reachmap.core.ik_redundant import RedundantSolver
 from reachmap.core.ik_rows import Rows, within_limits
@@ -40,12 +41,13 @@ class Kinematics:
     robot : RobotModel
     spec : IkSpec, optional
         How to solve; default: as the robot's cell says. ``auto`` takes the closed
-        form if there is one, then a seven-axis arm's grid, then the numeric solver.
+        form if there is one, also of a calibrated arm's nominal one, then a
+        seven-axis arm's grid, then the numeric solver.
 
     Attributes
     ----------
     method : str
-        ``analytic``, ``redundant-grid`` or ``numeric``.
+        ``analytic``, ``nominal-analytic``, ``redundant-grid`` or ``numeric``.
     complete : bool
         Whether a pose without solutions is proved to have none.
 
@@ -173,6 +175,9 @@ def _solver(robot: RobotModel, chain: SerialChain, spec: IkSpec) -> BranchSolver
     if spec.method != "numeric":
         if can_use_eaik(chain):
             return AnalyticSolver(chain)
+        nominal = nominal_chain(chain)
+        if nominal is not None:
+            return NominalSolver(chain, nominal)
         joint = _redundant_joint(robot, chain, spec)
         if joint is not None:
             return RedundantSolver(chain, lower, upper, joint, spec.redundant_samples)

@@ -218,9 +218,7 @@ class _Search:
 
     def waypoints(self) -> FloatArray:
         """Way-points, shape (n, dof)."""
-        states = (
-            self._path.getState(row) for row in range(self._path.getStateCount())
-        )
+        states = (self._path.getState(row) for row in range(self._path.getStateCount()))
         return np.array([[state[i] for i in range(self._dof)] for state in states])
 
     def simplified(self) -> FloatArray:

@@ -94,3 +94,35 @@ def execution_time_s(
     if len(path) < 2:
         return 0.0
     return float(segment_times_s(merge_straight(path), velocity, acceleration).sum())
+
+
+def straight_way_time_s(
+    way: FloatArray, velocity: FloatArray, acceleration: FloatArray
+) -> float:
+    """Time along a smooth way given by closely spaced points, at rest at its ends.
+
+    The points stand for a smooth curve, so nothing stops at them. The profile is a
+    trapezoid over the curve parameter s, with constant bounds that hold everywhere on
+    it: ``|q'| ṡ ≤ v`` and ``|q'| s̈ + |q''| ṡ² ≤ a``; half of each acceleration
+    limit is kept for the second term, so the time is never too short.
+
+    Parameters
+    ----------
+    way : array, shape (n, dof)
+        Evenly spaced along the straight line of the tool [rad].
+    velocity, acceleration : array, shape (dof,)
+        Limits [rad/s], [rad/s²].
+    """
+    if len(way) < 2:
+        return 0.0
+    first = np.diff(way, axis=0) * (len(way) - 1)
+    slope = np.maximum(np.abs(first).max(axis=0), 1e-12)
+    second = np.diff(first, axis=0) * (len(way) - 1)
+    bend = np.abs(second).max(axis=0, initial=0.0)
+    share = np.where(bend > 1e-9, 0.5, 1.0)
+    speed_sq = np.where(
+        bend > 1e-9, share * acceleration / np.maximum(bend, 1e-9), np.inf
+    )
+    v = min(float((velocity / slope).min()), float(np.sqrt(speed_sq.min())))
+    a = float((share * acceleration / slope).min())
+    return float(2 / np.sqrt(a) if v * v >= a else 1 / v + v / a)

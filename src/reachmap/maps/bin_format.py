@@ -33,7 +33,7 @@ INDEX_COLUMNS = ("layer", "y", "x", "orientation", "repeat")
 """What the columns of ``/paths/index`` count."""
 
 _PATH_VALUES = (
-    "path_length", "path_length_total", "tcp_path_length", "execution_time",
+    "path_length", "path_length_planned", "tcp_path_length", "execution_time",
     "planning_time", "planning_cpu_time", "simplification_time",
 )  # fmt: skip
 _LENGTH_TOLERANCE_RAD = 1e-6
@@ -108,14 +108,14 @@ def _check_paths(tree: Tree) -> list[str]:
     return [
         *require(found[place], "paths/index must name attempts that found a path"),
         *require(
-            np.abs(whole - tree.array("path_length_total")[place])
+            np.abs(whole - tree.array("path_length")[place])
             <= _LENGTH_TOLERANCE_RAD * (1.0 + whole),
-            "paths must be as long as path_length_total says",
+            "paths must be as long as path_length says",
         ),
         *require(
-            np.abs(part - tree.array("path_length")[place])
+            np.abs(part - tree.array("path_length_planned")[place])
             <= _LENGTH_TOLERANCE_RAD * (1.0 + part),
-            "paths must be as long as path_length says up to planned_size",
+            "paths must be as long as path_length_planned says up to planned_size",
         ),
     ]
 
@@ -247,8 +247,8 @@ BIN = Layout(
             meaning="1 where the limit on wall-clock time ended the attempt.",
             is_flag=True,
         ),
-        _measured("path_length", "rad", "Joint-space length of the planned part"),
-        _measured("path_length_total", "rad", "Joint-space length with the approach"),
+        _measured("path_length", "rad", "Joint-space length of the whole path"),
+        _measured("path_length_planned", "rad", "Joint-space length of the planned part"),
         _measured("tcp_path_length", "m", "Length of the way of the TCP, whole path"),
         _measured("planning_time", "s", "Wall-clock time of the planner"),
         _measured("planning_cpu_time", "s", "CPU time of the planning thread"),

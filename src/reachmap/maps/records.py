@@ -243,8 +243,8 @@ class BinMap:
     path_found : uint8 array, shape (nl, ny, nx, no, nr)
     hit_time_limit : uint8 array, same shape
         1 where the limit on wall-clock time ended the attempt; zeros if left out.
-    path_length, path_length_total : array, same shape
-        Planned part, and planned part plus straight approach [rad].
+    path_length, path_length_planned : array, same shape
+        Whole path, straight approach included, and its planned part [rad].
     tcp_path_length : array, same shape
         Length of the TCP's way, whole path [m].
     planning_time, planning_cpu_time, simplification_time, execution_time
@@ -271,7 +271,7 @@ class BinMap:
     connected: CodeArray
     path_found: CodeArray
     path_length: FloatArray
-    path_length_total: FloatArray
+    path_length_planned: FloatArray
     tcp_path_length: FloatArray
     planning_time: FloatArray
     planning_cpu_time: FloatArray

@@ -138,8 +138,8 @@ class Crew:
         Yields
         ------
         Reply or None
-            None when nothing came for a tenth of a second, so that the caller can
-            look after other things.
+            None once a round, at least ten times a second, so that the caller can
+            look after other things, and stop before dead workers are replaced.
 
         Raises
         ------
@@ -157,11 +157,10 @@ class Crew:
                 if self._waiting or any(lane.suspects for lane in self._lanes):
                     continue
                 return
-            done, _ = wait(futures, timeout=TICK_S, return_when=FIRST_COMPLETED)
-            if not done:
-                yield None
+            wait(futures, timeout=TICK_S, return_when=FIRST_COMPLETED)
             for lane in self._lanes:
                 yield from self._collect(lane)
+            yield None
 
     def _hand_out(self) -> None:
         # Round by round, so that the last units are spread over the lanes.

@@ -12,6 +12,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from reachmap.errors import IncompleteError, MapFileError, OutputError
+from reachmap.maps.publish import sync_folder
 from reachmap.scans.journal_entries import Entries
 from reachmap.scans.journal_format import (
     MAX_LINE,
@@ -243,7 +244,7 @@ def _prepared(path: Path, descriptor: int, header: Header, *, restart: bool) -> 
         except OSError as error:
             os.ftruncate(descriptor, 0)
             raise OutputError(f"{path}: {error.strerror}") from error
-        _sync_folder(path.parent)
+        sync_folder(path.parent)
     try:
         entries = Entries(path, descriptor)
     except MapFileError as error:
@@ -285,13 +286,3 @@ def _write_all(descriptor: int, data: bytes, offset: int) -> None:
     while view:
         written = os.pwrite(descriptor, view, offset)
         view, offset = view[written:], offset + written
-
-
-def _sync_folder(folder: Path) -> None:
-    descriptor = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    except OSError:  # some file systems cannot; the file itself is safe
-        log.debug("%s cannot be synced", folder)
-    finally:
-        os.close(descriptor)

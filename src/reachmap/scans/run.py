@@ -12,19 +12,15 @@ from __future__ import annotations
 
 import json
 import logging
-import platform
 import shlex
 import sys
-import time
 from collections.abc import Iterator
-from contextlib import closing, contextmanager
+from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from reachmap.errors import OutputError
-from reachmap.maps.records import RunInfo
+from reachmap.maps import RunClock, RunInfo, check_output
 from reachmap.scans.crew import Crew
 from reachmap.scans.executors import check_executor, open_lanes
 from reachmap.scans.journal import (
@@ -111,30 +107,28 @@ def run_scan(
         After Ctrl-C or SIGTERM; everything done is in the journal.
     """
     journal = journal_path(output, shard)
-    if shard is None and output.exists() and not (overwrite or journal.exists()):
-        raise OutputError(f"{output} exists: choose another output, or --overwrite it")
-    started, clock_s = datetime.now(UTC), time.monotonic()
-    with run_units(
-        work,
-        output=output,
-        workers=workers,
-        executor=executor,
-        shard=shard,
-        restart=restart,
-        progress=progress,
-    ) as results:
-        run = run_info(
-            started=started,
-            workers=workers,
-            wall_s={"units": time.monotonic() - clock_s},
-            cpu_s={"units": results.cpu_s},
-        )
+    if shard is None:
+        check_output(output, overwrite=overwrite or journal.exists())
+    clock = RunClock(workers=workers)
+    with ExitStack() as stack:
+        with clock.phase("units"):
+            results = stack.enter_context(
+                run_units(
+                    work,
+                    output=output,
+                    workers=workers,
+                    executor=executor,
+                    shard=shard,
+                    restart=restart,
+                    progress=progress,
+                )
+            )
+        clock.add_cpu("units", results.cpu_s)
+        run = clock.finish()
         path, artefact = journal, None
         if shard is None:
-            path, artefact = (
-                output,
-                work.kind.assemble(results.document, results, run=run),
-            )
+            path = output
+            artefact = work.kind.assemble(results.document, results, run=run)
             work.kind.write(output, artefact, overwrite=True)
     results.check_failures(path)
     return Outcome(
@@ -212,25 +206,6 @@ def header_of(work: Work, shard: tuple[int, int] | None = None) -> Header:
         shard=shard or (1, 1),
         settings={**work.settings, "packages": package_versions()},
         document=work.document,
-    )
-
-
-def run_info(
-    *,
-    started: datetime,
-    workers: int,
-    wall_s: dict[str, float],
-    cpu_s: dict[str, float],
-) -> RunInfo:
-    """Record of a run that ends now, on this machine, by this command."""
-    return RunInfo(
-        started=started.isoformat(timespec="seconds"),
-        finished=datetime.now(UTC).isoformat(timespec="seconds"),
-        host=platform.node(),
-        command_line=command_line(),
-        workers=workers,
-        wall_s=wall_s,
-        cpu_s=cpu_s,
     )
 
 

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import ExitStack
-from datetime import UTC, datetime
 from pathlib import Path
 
-from reachmap.errors import IncompleteError, MapFileError, OutputError, SettingsError
+from reachmap.errors import IncompleteError, MapFileError, SettingsError
+from reachmap.maps import RunClock, check_output
 from reachmap.scans.journal_entries import Entries, read_journal
 from reachmap.scans.journal_format import differences
 from reachmap.scans.results import Results, units_text
-from reachmap.scans.run import Outcome, run_info
+from reachmap.scans.run import Outcome
 from reachmap.scans.work import kind_named
 
 
@@ -43,9 +43,8 @@ def merge_journals(
     """
     if not paths:
         raise SettingsError("nothing to merge: name the journals of the shards")
-    if output.exists() and not overwrite:
-        raise OutputError(f"{output} exists: choose another output, or --overwrite it")
-    started = datetime.now(UTC)
+    check_output(output, overwrite=overwrite)
+    clock = RunClock(workers=len(paths))
     with ExitStack() as stack:
         journals = {path: stack.enter_context(read_journal(path)) for path in paths}
         if len(journals) < len(paths):
@@ -56,12 +55,8 @@ def merge_journals(
         kind = kind_named(in_order[0].header.kind, source=paths[0])
         results = Results(kind, in_order)
         _check_complete(results, in_order)
-        run = run_info(
-            started=started,
-            workers=len(in_order),
-            wall_s={},
-            cpu_s={"units": results.cpu_s},
-        )
+        clock.add_cpu("units", results.cpu_s)
+        run = clock.finish()
         artefact = kind.assemble(results.document, results, run=run)
         kind.write(output, artefact, overwrite=overwrite)
     results.check_failures(output)

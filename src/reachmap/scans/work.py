@@ -6,15 +6,17 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 from reachmap.errors import MapFileError
-from reachmap.maps.records import RunInfo, Status
 from reachmap.scans.encoding import Json, json_from_value, value_from_json
 
+if TYPE_CHECKING:  # workers import this module, and have no use for HDF5
+    from reachmap.maps.records import RunInfo, Status
+
 KINDS: dict[str, str] = {
-    "workspace_map": "reachmap.scans.workspace:KIND",
-    "bin_map": "reachmap.scans.bin:KIND",
+    "workspace_map": "reachmap.scans.workspace_per_frame:KIND",
+    "bin_map": "reachmap.scans.bin_scan:KIND",
 }
 """Kind of scan to ``module:name`` of its :class:`Kind`; imported on use."""
 

@@ -48,12 +48,12 @@ class InProcess(Executor):
 
 
 class WorkerProcess(ProcessPoolExecutor):
-    """A pool of one process that dies with this one, and promptly when told to."""
+    """A pool of one process that is stopped at once, and does not outlive this one."""
 
     def __init__(self, parcel: Parcel) -> None:
         spawn = multiprocessing.get_context("spawn")
-        # The worker holds the reading end of a pipe and leaves when it closes: when
-        # told to stop, and also when this process is killed.
+        # The worker holds the reading end of a pipe and leaves when the other end is
+        # closed, which also happens when this process is killed.
         self._reader, self._writer = spawn.Pipe(duplex=False)
         super().__init__(
             max_workers=1,
@@ -66,6 +66,8 @@ class WorkerProcess(ProcessPoolExecutor):
         """Stop the worker, whatever it is doing."""
         self._writer.close()
         self._reader.close()
+        for process in list((self._processes or {}).values()):
+            process.kill()  # it has nothing to put in order
         self.shutdown(wait=True, cancel_futures=True)
 
 

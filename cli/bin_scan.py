@@ -1,0 +1,66 @@
+"""``reachmap bin-scan``: plan to every test grasp inside the bin."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import click
+
+from reachmap.cli.answers import facts_text
+from reachmap.cli.options import INPUT_FILE, cell_option, output_option, scan_options
+
+
+@click.command()
+@click.argument(
+    "placement", metavar="[PLACEMENT]", type=INPUT_FILE, required=False, default=None
+)
+@cell_option
+@output_option("bin.h5")
+@scan_options
+def command(
+    placement: Path | None,
+    cell: str | None,
+    output: Path,
+    overrides: tuple[str, ...],
+    seed: int | None,
+    workers: int,
+    executor: str,
+    shard: tuple[int, int] | None,
+    restart: bool,
+    overwrite: bool,
+    dry_run: bool,
+    progress: bool,
+    as_json: bool,
+) -> None:
+    """Plan to every test grasp inside the bin.
+
+    PLACEMENT is what place-bin wrote; by default placement.h5 in this folder. It
+    holds the cell with its bin and scan configuration, so nothing else is needed.
+    With --cell the bin stands where that cell has it. Each test grasp is planned
+    several times and every attempt is kept. Ctrl-C loses nothing: the same
+    command goes on.
+
+    Example: reachmap bin-scan placement.h5 --set bin_scan.repeats=1
+    """
+    from reachmap.tools.bin_scan import bin_scan, estimate_bin_scan, summary_of_bin
+    from reachmap.tools.options import RunOptions
+
+    if placement is None and cell is None:
+        placement = Path("placement.h5")
+    run = RunOptions(
+        workers=workers,
+        executor=executor,
+        shard=shard,
+        restart=restart,
+        overwrite=overwrite,
+        quiet=not progress,
+    )
+    if dry_run:
+        facts = estimate_bin_scan(placement, cell=cell, overrides=overrides, run=run)
+    else:
+        result = bin_scan(
+            placement, output, cell=cell, overrides=overrides, seed=seed, run=run
+        )
+        facts = {"output": str(output)} | summary_of_bin(result)
+    click.echo(json.dumps(facts) if as_json else facts_text(facts))

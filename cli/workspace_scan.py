@@ -1,0 +1,85 @@
+"""``reachmap workspace-scan``: map what the arm reaches around its base."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import click
+
+from reachmap.cli.answers import facts_text
+from reachmap.cli.options import cell_argument, output_option, scan_options
+
+
+@click.command()
+@cell_argument
+@click.option(
+    "--method",
+    type=click.Choice(["roadmap", "per-frame"]),
+    default="roadmap",
+    show_default=True,
+    help="roadmap joins all frames' configurations and plans to what is not "
+    "connected; per-frame plans to each frame from scratch, as the paper did.",
+)
+@click.option(
+    "--with-bin",
+    is_flag=True,
+    help="Leave the cell's bin in the scene; it is what is to be placed.",
+)
+@output_option("workspace.h5")
+@scan_options
+def command(
+    cell: str,
+    method: str,
+    with_bin: bool,
+    output: Path,
+    overrides: tuple[str, ...],
+    seed: int | None,
+    workers: int,
+    executor: str,
+    shard: tuple[int, int] | None,
+    restart: bool,
+    overwrite: bool,
+    dry_run: bool,
+    progress: bool,
+    as_json: bool,
+) -> None:
+    """Map what the arm reaches around its base.
+
+    CELL is a shipped cell by name or the path of a cell file. Every test frame of
+    the cell's cubes gets a state with a cause: a path from the scan configuration, no
+    inverse kinematics, a collision of two named bodies, or no path found.
+
+    Example: reachmap workspace-scan ur5-eye-in-hand --seed 7
+    """
+    from reachmap.tools.options import RunOptions
+    from reachmap.tools.workspace_scan import (
+        estimate_workspace_scan,
+        summary_of_workspace,
+        workspace_scan,
+    )
+
+    run = RunOptions(
+        workers=workers,
+        executor=executor,
+        shard=shard,
+        restart=restart,
+        overwrite=overwrite,
+        quiet=not progress,
+    )
+    if dry_run:
+        facts = estimate_workspace_scan(
+            cell, method=method, overrides=overrides, run=run
+        )
+    else:
+        result = workspace_scan(
+            cell,
+            output,
+            method=method,
+            with_bin=with_bin,
+            overrides=overrides,
+            seed=seed,
+            run=run,
+        )
+        facts = {"output": str(output)} | summary_of_workspace(result)
+    click.echo(json.dumps(facts) if as_json else facts_text(facts))

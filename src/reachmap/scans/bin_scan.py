@@ -1,0 +1,238 @@
+"""Bin scan: every test grasp planned ``repeats`` times, each attempt kept."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from reachmap._typing import BoolArray, FloatArray
+from reachmap.cell.model import Cell
+from reachmap.core.planning import PlanResult
+from reachmap.core.scene import Scene
+from reachmap.core.timing import (
+    execution_time_s,
+    path_length_rad,
+    polyline_length_m,
+    straight_way_time_s,
+)
+from reachmap.maps import BinMap, RunInfo, Status, write_bin_map
+from reachmap.scans.bin_results import MEASURED, GraspResults, assemble_bin_map
+from reachmap.scans.document import journal_settings
+from reachmap.scans.seeds import attempt_seed
+from reachmap.scans.survey import Survey
+from reachmap.scans.work import Kind, Work
+
+if TYPE_CHECKING:
+    from reachmap.cell.loading import LoadedCell
+
+GRASPS_PER_UNIT = 9
+CHECKS_UNCONNECTED = 1_000
+"""Budget of an attempt at a grasp that the roadmap could not connect."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BinContext:
+    """What a worker needs: the cell, and what is known of every test grasp."""
+
+    loaded: LoadedCell
+    survey: Survey
+    connected: BoolArray
+
+
+def bin_work(
+    loaded: LoadedCell,
+    document: Mapping[str, Any],
+    survey: Survey,
+    connected: BoolArray,
+) -> Work:
+    """Work of a bin scan.
+
+    Parameters
+    ----------
+    loaded : LoadedCell
+    document : mapping
+    survey : Survey
+        Of all test grasps.
+    connected : bool array, shape (grasps,)
+        Whether the roadmap proves a path.
+    """
+    grasps = len(survey.status)
+    return Work(
+        kind=KIND,
+        units=-(-grasps // GRASPS_PER_UNIT),
+        function=plan_unit,
+        prepare=prepare,
+        context=BinContext(loaded=loaded, survey=survey, connected=connected),
+        settings=journal_settings(document),
+        document=document,
+        tally=tally,
+        frames=grasps,
+    )
+
+
+def prepare(context: BinContext) -> tuple[BinContext, Scene]:
+    """Build the scene, once per worker."""
+    return context, Scene.build(context.loaded, with_bin=True)
+
+
+def plan_unit(state: tuple[BinContext, Scene], unit: int) -> dict[str, Any]:
+    """Plan all attempts at the test grasps of one unit."""
+    context, scene = state
+    begin = unit * GRASPS_PER_UNIT
+    grasps = range(begin, min(begin + GRASPS_PER_UNIT, len(context.survey.status)))
+    parts = [
+        plan_grasp(
+            scene, context.survey, grasp, connected=bool(context.connected[grasp])
+        )
+        for grasp in grasps
+    ]
+    return dataclasses.asdict(GraspResults.join(parts))
+
+
+def plan_grasp(
+    scene: Scene, survey: Survey, grasp: int, *, connected: bool
+) -> GraspResults:
+    """Make all attempts at one test grasp.
+
+    Parameters
+    ----------
+    scene : Scene
+    survey : Survey
+    grasp : int
+        Its number in the survey, which with the cell's seed makes its own.
+    connected : bool
+        Whether the roadmap proves a path; if not, attempts are short.
+    """
+    scene.checker.reset()
+    cell = scene.loaded.cell
+    goals = survey.goals_of(grasp)
+    budget = None if connected else min(CHECKS_UNCONNECTED, cell.planner.max_checks)
+    plans = [
+        scene.planner.plan(
+            scene.scan_configuration,
+            survey.goals[goals],
+            attempt_seed(cell.seed, grasp, repeat),
+            max_checks=budget,
+        )
+        for repeat in range(cell.bin_scan.repeats if len(goals) else 0)
+    ]
+    ways = [survey.way_of(int(goal)) for goal in goals]
+    return _results(scene, survey, grasp, plans, ways, connected=connected)
+
+
+def _results(
+    scene: Scene,
+    survey: Survey,
+    grasp: int,
+    plans: Sequence[PlanResult],
+    ways: Sequence[FloatArray],
+    *,
+    connected: bool,
+) -> GraspResults:
+    repeats = scene.loaded.cell.bin_scan.repeats
+    measured = np.full((1, repeats, len(MEASURED)), np.nan)
+    paths: list[FloatArray] = []
+    planned: list[int] = []
+    place: list[tuple[int, int]] = []
+    for repeat, plan in enumerate(plans):
+        if plan.path is None:
+            continue
+        way = ways[plan.goal]
+        paths.append(np.vstack([plan.path, way[1:]]))
+        planned.append(len(plan.path))
+        place.append((0, repeat))
+        measured[0, repeat] = measure_path(scene, plan, way)
+    return GraspResults(
+        status=np.array([_status(survey, grasp, plans, connected=connected)], np.uint8),
+        n_ik=survey.n_ik[[grasp]],
+        n_ik_free=survey.n_ik_free[[grasp]],
+        connected=np.array([connected], np.uint8),
+        blocking_pair=survey.blocking_pair[[grasp]],
+        path_found=np.isfinite(measured[..., 0]).astype(np.uint8),
+        measured=measured,
+        goal_configuration=_shortest_goal(paths, measured, scene.robot.dof),
+        configuration=np.vstack([np.zeros((0, scene.robot.dof)), *paths]),
+        row_size=np.array([len(path) for path in paths], np.int64),
+        planned_size=np.array(planned, np.int64),
+        place=np.array(place, np.int64).reshape(-1, 2),
+    )
+
+
+def measure_path(scene: Scene, plan: PlanResult, way: FloatArray) -> list[float]:
+    """Numbers of one successful attempt, in the order of ``MEASURED``.
+
+    The execution time counts the planned path, the straight approach and the retreat,
+    which is the approach backwards and takes as long.
+
+    Parameters
+    ----------
+    scene : Scene
+    plan : PlanResult
+        With a path.
+    way : array, shape (n, dof)
+        Straight approach from the end of the path to the grasp.
+    """
+    assert plan.path is not None
+    limits = (scene.robot.velocity_rad_s, scene.robot.acceleration_rad_s2)
+    whole = np.vstack([plan.path, way[1:]])
+    return [
+        path_length_rad(whole),
+        path_length_rad(plan.path),
+        polyline_length_m(scene.tcp_path_points(whole)),
+        plan.planning_time_s,
+        plan.planning_cpu_time_s,
+        plan.simplification_time_s,
+        execution_time_s(plan.path, *limits) + 2 * straight_way_time_s(way, *limits),
+    ]
+
+
+def _status(
+    survey: Survey, grasp: int, plans: Sequence[PlanResult], *, connected: bool
+) -> int:
+    if not plans:
+        return int(survey.status[grasp])
+    # A path that the roadmap proves counts, even if every attempt missed it.
+    found = connected or any(plan.path is not None for plan in plans)
+    return Status.PATH_FOUND if found else Status.NO_PATH_FOUND
+
+
+def _shortest_goal(
+    paths: Sequence[FloatArray], measured: FloatArray, dof: int
+) -> FloatArray:
+    if not paths:
+        return np.full((1, dof), np.nan)
+    lengths = measured[0, :, 0]
+    return np.array(paths[int(np.argmin(lengths[np.isfinite(lengths)]))][-1:])
+
+
+def tally(payload: Mapping[str, Any]) -> tuple[int, int]:
+    """Path-reachable grasps, and all grasps, of a unit."""
+    status = payload["status"]
+    return int((status == Status.PATH_FOUND).sum()), len(status)
+
+
+def blank(document: Mapping[str, Any], unit: int, status: Status) -> dict[str, Any]:
+    """Payload of a unit without results."""
+    spec = Cell.model_validate_json(
+        document["provenance"]["cell_resolved_json"]
+    ).bin_scan
+    left = document["grasps"] - unit * GRASPS_PER_UNIT
+    empty = GraspResults.blank(
+        min(GRASPS_PER_UNIT, left), spec.repeats, len(document["joint_names"]), status
+    )
+    return dataclasses.asdict(empty)
+
+
+def assemble(
+    document: Mapping[str, Any], payloads: Sequence[Any], *, run: RunInfo
+) -> BinMap:
+    """Make the map from the payloads of all units."""
+    results = GraspResults.join([GraspResults(**payload) for payload in payloads])
+    return assemble_bin_map(document, results, run=run)
+
+
+KIND = Kind(name="bin_map", blank=blank, assemble=assemble, write=write_bin_map)

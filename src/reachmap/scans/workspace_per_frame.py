@@ -1,0 +1,155 @@
+"""Workspace scan as the paper did it: a plan from scratch to each frame."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from reachmap._typing import FloatArray
+from reachmap.cell.model import Cell
+from reachmap.core.scene import Scene
+from reachmap.core.timing import path_length_rad
+from reachmap.maps import RunInfo, Status, WorkspaceMap, write_workspace_map
+from reachmap.sampling.frames import workspace_frames
+from reachmap.scans.document import journal_settings
+from reachmap.scans.seeds import attempt_seed
+from reachmap.scans.survey import survey_frames
+from reachmap.scans.work import Kind, Work
+from reachmap.scans.workspace_results import FrameResults, assemble_workspace_map
+
+if TYPE_CHECKING:
+    from reachmap.cell.loading import LoadedCell
+
+FRAMES_PER_UNIT = 9
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PerFrameContext:
+    """What a worker needs; frames are numbered through the cubes."""
+
+    loaded: LoadedCell
+    with_bin: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _State:
+    scene: Scene
+    poses: FloatArray
+
+
+def per_frame_work(
+    loaded: LoadedCell, document: Mapping[str, Any], *, with_bin: bool
+) -> Work:
+    """Work of a scan that plans to each frame."""
+    frames = frames_of_cell(loaded.cell)
+    return Work(
+        kind=KIND,
+        units=-(-frames // FRAMES_PER_UNIT),
+        function=plan_unit,
+        prepare=prepare,
+        context=PerFrameContext(loaded=loaded, with_bin=with_bin),
+        settings=journal_settings(document),
+        document=document,
+        tally=tally,
+        frames=frames,
+    )
+
+
+def frames_of_cell(cell: Cell) -> int:
+    """Number of test frames of a cell's workspace scan."""
+    cubes = workspace_frames(cell.workspace_scan, cell.robot.tcp.approach_axis)
+    return sum(cube.frames.size for cube in cubes)
+
+
+def prepare(context: PerFrameContext) -> _State:
+    """Build scene and frames, once per worker."""
+    cell = context.loaded.cell
+    cubes = workspace_frames(cell.workspace_scan, cell.robot.tcp.approach_axis)
+    return _State(
+        scene=Scene.build(context.loaded, with_bin=context.with_bin),
+        poses=np.concatenate([c.frames.transforms().reshape(-1, 4, 4) for c in cubes]),
+    )
+
+
+def plan_unit(state: _State, unit: int) -> dict[str, Any]:
+    """Plan to the frames of one unit."""
+    scene, begin = state.scene, unit * FRAMES_PER_UNIT
+    frames = np.arange(begin, min(begin + FRAMES_PER_UNIT, len(state.poses)))
+    results = plan_frames(scene, state.poses[frames], frames)
+    return dataclasses.asdict(results)
+
+
+def plan_frames(
+    scene: Scene, T_base_tcp: FloatArray, numbers: Sequence[int]
+) -> FrameResults:
+    """Plan to frames, each up to ``repeats`` times and until the first success.
+
+    Parameters
+    ----------
+    scene : Scene
+    T_base_tcp : array, shape (n, 4, 4)
+    numbers : sequence of int
+        Number of each frame in the scan, which with the cell's seed makes its own.
+    """
+    scene.checker.reset()
+    cell = scene.loaded.cell
+    survey = survey_frames(scene, T_base_tcp, 0.0)
+    count, dof = len(T_base_tcp), scene.robot.dof
+    status = survey.status.copy()
+    attempts, found = np.zeros(count, np.uint8), np.zeros(count, np.uint8)
+    length, goal = np.full(count, np.nan), np.full((count, dof), np.nan)
+    for k in np.flatnonzero(status == Status.NOT_ATTEMPTED):
+        goals = survey.goals[survey.goals_of(int(k))]
+        status[k] = Status.NO_PATH_FOUND
+        for repeat in range(cell.workspace_scan.repeats):
+            attempts[k] += 1
+            seed = attempt_seed(cell.seed, int(numbers[k]), repeat)
+            plan = scene.planner.plan(scene.scan_configuration, goals, seed)
+            if plan.path is not None:
+                status[k], found[k] = Status.PATH_FOUND, 1
+                length[k], goal[k] = path_length_rad(plan.path), goals[plan.goal]
+                break
+    return FrameResults(
+        status=status,
+        blocking_pair=survey.blocking_pair,
+        n_ik=survey.n_ik,
+        n_ik_free=survey.n_ik_free,
+        attempts=attempts,
+        paths_found=found,
+        component=np.full(count, -1, np.int64),
+        path_length=length,
+        goal_configuration=goal,
+    )
+
+
+def tally(payload: Mapping[str, Any]) -> tuple[int, int]:
+    """Frames with a path, and all frames, of a unit."""
+    status = payload["status"]
+    return int((status == Status.PATH_FOUND).sum()), len(status)
+
+
+def blank(document: Mapping[str, Any], unit: int, status: Status) -> dict[str, Any]:
+    """Payload of a unit without results."""
+    cell = Cell.model_validate_json(document["provenance"]["cell_resolved_json"])
+    left = frames_of_cell(cell) - unit * FRAMES_PER_UNIT
+    dof = len(document["joint_names"])
+    return dataclasses.asdict(
+        FrameResults.blank(min(FRAMES_PER_UNIT, left), dof, status)
+    )
+
+
+def assemble(
+    document: Mapping[str, Any], payloads: Sequence[Any], *, run: RunInfo
+) -> WorkspaceMap:
+    """Make the map from the payloads of all units."""
+    results = FrameResults.join([FrameResults(**payload) for payload in payloads])
+    return assemble_workspace_map(document, results, run=run)
+
+
+KIND = Kind(
+    name="workspace_map", blank=blank, assemble=assemble, write=write_workspace_map
+)

@@ -1,0 +1,111 @@
+"""Workspace scan by connectivity: every frame at once, seconds instead of hours."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from reachmap._typing import FloatArray, IntArray
+from reachmap.core.connection import ROADMAP_PLANNER, Connection, connect
+from reachmap.core.planning import Planner
+from reachmap.core.scene import Scene
+from reachmap.maps import Status
+from reachmap.scans.survey import MAX_COUNT, Survey
+from reachmap.scans.workspace_results import FrameResults
+
+
+def connect_survey(
+    scene: Scene, survey: Survey, *, attempts: int, seed: int
+) -> Connection:
+    """Connect the goals of a survey to the scan configuration.
+
+    Parameters
+    ----------
+    scene : Scene
+    survey : Survey
+    attempts : int
+        Attempts of the planner per component.
+    seed : int
+    """
+    scene.checker.reset()
+    planner = Planner(
+        scene.motions, scene.robot.lower_rad, scene.robot.upper_rad, ROADMAP_PLANNER
+    )
+    return connect(
+        scene.scan_configuration,
+        survey.goals,
+        survey.frame,
+        planner,
+        attempts=attempts,
+        seed=seed,
+    )
+
+
+def results_of_connection(survey: Survey, connection: Connection) -> FrameResults:
+    """Results of all frames of a survey.
+
+    A frame's goal is its connected configuration with the shortest path; its
+    attempts are those of the components that its goals lie in.
+    """
+    frames, goals = len(survey.status), survey.goals
+    length = connection.roadmap.shortest_paths().length_rad[1 : len(goals) + 1]
+    best = _best_goal(survey.frame, length, frames)
+    found = best >= 0
+    status = survey.status.copy()
+    status[status == Status.NOT_ATTEMPTED] = Status.NO_PATH_FOUND
+    status[found] = Status.PATH_FOUND
+    path_length = np.full(frames, np.nan)
+    path_length[found] = length[best[found]]
+    configuration = np.full((frames, goals.shape[1]), np.nan)
+    configuration[found] = goals[best[found]]
+    component = _component_of_frames(survey.frame, connection, best, frames)
+    attempts = np.zeros(frames, np.int64)
+    known = connection.component >= 0
+    np.add.at(
+        attempts,
+        *_distinct(
+            survey.frame[known], connection.component[known], connection.attempts
+        ),
+    )
+    return FrameResults(
+        status=status,
+        blocking_pair=survey.blocking_pair,
+        n_ik=survey.n_ik,
+        n_ik_free=survey.n_ik_free,
+        attempts=np.minimum(attempts, MAX_COUNT).astype(np.uint8),
+        paths_found=found.astype(np.uint8),
+        component=component,
+        path_length=path_length,
+        goal_configuration=configuration,
+    )
+
+
+def _best_goal(frame: IntArray, length: FloatArray, frames: int) -> IntArray:
+    """Goal with the shortest path of each frame, -1 without a connected one."""
+    best = np.full(frames, -1, np.int64)
+    # The last write wins, so the shortest goes last.
+    order = np.argsort(-length, kind="stable")
+    order = order[np.isfinite(length[order])]
+    best[frame[order]] = order
+    return best
+
+
+def _component_of_frames(
+    frame: IntArray, connection: Connection, best: IntArray, frames: int
+) -> IntArray:
+    """Component of the best goal, or of any goal where none is connected."""
+    component = np.full(frames, -1, np.int64)
+    known = connection.component >= 0
+    component[frame[known][::-1]] = connection.component[known][::-1]
+    found = best >= 0
+    component[found] = connection.component[best[found]]
+    return component
+
+
+def _distinct(
+    frame: IntArray, component: IntArray, attempts: Sequence[int] | IntArray
+) -> tuple[IntArray, IntArray]:
+    """Frames and the attempts of each different component they touch."""
+    pairs = np.unique(np.stack([frame, component], axis=1), axis=0)
+    return pairs[:, 0], np.asarray(attempts)[pairs[:, 1]]

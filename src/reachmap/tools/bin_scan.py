@@ -1,0 +1,190 @@
+"""``bin-scan``: a placed bin goes in, a bin map comes out."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from reachmap._typing import BoolArray
+from reachmap.cell.loading import read_cell
+from reachmap.core.scene import Scene
+from reachmap.maps import BinMap, Status, read_placement
+from reachmap.sampling.frames import FrameGrid, bin_test_frames
+from reachmap.scans.bin_scan import CHECKS_UNCONNECTED, bin_work, plan_grasp
+from reachmap.scans.document import checking_settings, roadmap_settings, scan_document
+from reachmap.scans.progress import Progress
+from reachmap.scans.run import run_scan
+from reachmap.scans.survey import Survey, survey_frames
+from reachmap.scans.survey_run import SurveyContext, run_survey
+from reachmap.scans.workspace_roadmap import connect_survey
+from reachmap.tools.options import (
+    IN_PROCESS,
+    RunOptions,
+    cell_of_artefact,
+    with_seed,
+)
+
+if TYPE_CHECKING:
+    from reachmap.cell.loading import LoadedCell
+
+SAMPLE_GRASPS = 20
+
+
+def bin_scan(
+    placement: Path | None,
+    output: Path,
+    *,
+    cell: str | None = None,
+    overrides: Sequence[str] = (),
+    seed: int | None = None,
+    run: RunOptions = IN_PROCESS,
+) -> BinMap | None:
+    """Plan to every test grasp inside the bin, ``repeats`` times.
+
+    Parameters
+    ----------
+    placement : Path or None
+        Artefact of place-bin, which holds the cell with its bin pose and scan
+        configuration. None takes the bin where the cell has it.
+    output : Path
+        The artefact to write.
+    cell : str, optional
+        Instead of the placement's cell: shipped name or path.
+    overrides : sequence of str
+        ``key.path=value``.
+    seed : int, optional
+    run : RunOptions
+
+    Returns
+    -------
+    BinMap or None
+        What was written; None for a shard, whose journal waits to be merged.
+
+    Raises
+    ------
+    ReachmapError
+        See :mod:`reachmap.errors`.
+    """
+    loaded, source = load_placed_cell(placement, cell, with_seed(overrides, seed))
+    scene = Scene.build(loaded, with_bin=True)
+    scene.require_free_scan_configuration()
+    document = scan_document(
+        scene,
+        kind="bin_map",
+        method="planned",
+        settings=_settings(scene),
+        source_sha256=source,
+    )
+    survey = run_survey(
+        _survey_context(loaded, scene),
+        workers=run.workers,
+        executor=run.executor,
+        progress=Progress("bin-scan survey", quiet=run.quiet),
+    )
+    connected = _connected(scene, survey)
+    outcome = run_scan(
+        bin_work(loaded, document | {"grasps": len(survey.status)}, survey, connected),
+        output=output,
+        workers=run.workers,
+        executor=run.executor,
+        shard=run.shard,
+        restart=run.restart,
+        overwrite=run.overwrite,
+        progress=Progress("bin-scan", quiet=run.quiet),
+    )
+    return outcome.artefact  # type: ignore[no-any-return]
+
+
+def load_placed_cell(
+    placement: Path | None, cell: str | None, overrides: Sequence[str]
+) -> tuple[LoadedCell, str]:
+    """Cell to scan, and the content hash of its placement ("" without one)."""
+    if placement is None or cell is not None:
+        return read_cell(cell or "ur5-eye-in-hand", overrides), ""
+    placed = read_placement(placement)
+    loaded = cell_of_artefact(placed.provenance, str(placement), overrides)
+    return loaded, placed.stamp.content_sha256
+
+
+def summary_of_bin(bin_map: BinMap | None) -> dict[str, Any]:
+    """Headline of a map: grasps, reachability after one and all attempts."""
+    if bin_map is None:
+        return {}
+    reachable = bin_map.status == Status.PATH_FOUND
+    first = bin_map.path_found[..., 0] > 0
+    return {
+        "test_grasps": reachable.size,
+        "plans": bin_map.path_found.size,
+        "reachable_after_1_attempt_percent": round(100 * float(first.mean()), 2),
+        "path_reachability_percent": round(100 * float(reachable.mean()), 2),
+    }
+
+
+def estimate_bin_scan(
+    placement: Path | None,
+    *,
+    cell: str | None,
+    overrides: Sequence[str],
+    run: RunOptions,
+) -> dict[str, Any]:
+    """Say what a scan would do, timed on a few test grasps; nothing is written."""
+    loaded, _ = load_placed_cell(placement, cell, overrides)
+    scene = Scene.build(loaded, with_bin=True)
+    scene.require_free_scan_configuration()
+    grid = _grid(loaded, scene)
+    rows = np.random.default_rng(0).permutation(grid.size)[:SAMPLE_GRASPS]
+    begin = time.perf_counter()
+    survey = survey_frames(
+        scene, grid.transforms_at(rows), loaded.cell.bin_scan.approach_distance_m
+    )
+    for row in range(len(rows)):
+        plan_grasp(scene, survey, row, connected=True)
+    seconds = (time.perf_counter() - begin) / len(rows) * grid.size
+    return {
+        "cell": loaded.cell.name,
+        "test_grasps": grid.size,
+        "plans": grid.size * loaded.cell.bin_scan.repeats,
+        "estimated_s": round(seconds / run.workers, 1),
+    }
+
+
+def _connected(scene: Scene, survey: Survey) -> BoolArray:
+    """Which test grasps the roadmap proves reachable, shape (grasps,)."""
+    cell = scene.loaded.cell
+    connection = connect_survey(
+        scene, survey, attempts=cell.bin_scan.repeats, seed=cell.seed
+    )
+    connected = np.zeros(len(survey.status), bool)
+    connected[connection.roadmap.frames_reached()] = True
+    return connected
+
+
+def _grid(loaded: LoadedCell, scene: Scene) -> FrameGrid:
+    cell = loaded.cell
+    axis = cell.robot.tcp.approach_axis
+    return bin_test_frames(cell.bin_scan, cell.bin, axis, scene.T_base_bin).frames
+
+
+def _survey_context(loaded: LoadedCell, scene: Scene) -> SurveyContext:
+    return SurveyContext(
+        loaded=loaded,
+        with_bin=True,
+        grids=(_grid(loaded, scene),),
+        approach_m=loaded.cell.bin_scan.approach_distance_m,
+    )
+
+
+def _settings(scene: Scene) -> dict[str, Any]:
+    cell = scene.loaded.cell
+    return {
+        **checking_settings(scene),
+        "planner": cell.planner.model_dump(mode="json"),
+        "roadmap": roadmap_settings(),
+        "max_checks_unconnected": CHECKS_UNCONNECTED,
+        "repeats": cell.bin_scan.repeats,
+        "approach_distance_m": cell.bin_scan.approach_distance_m,
+    }

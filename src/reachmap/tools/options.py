@@ -1,0 +1,58 @@
+"""Settings that several tools share."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from reachmap.cell.loading import cell_from_json
+from reachmap.maps import Provenance
+
+if TYPE_CHECKING:
+    from reachmap.cell.loading import LoadedCell
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RunOptions:
+    """How a scan is carried out; nothing here changes its result."""
+
+    workers: int = 1
+    executor: str = "processes"
+    shard: tuple[int, int] | None = None
+    restart: bool = False
+    overwrite: bool = False
+    quiet: bool = True
+
+
+def with_seed(overrides: Sequence[str], seed: int | None) -> tuple[str, ...]:
+    """Append to overrides the seed of ``--seed``, if one was given."""
+    return (*overrides, *(() if seed is None else (f"seed={seed}",)))
+
+
+def cell_of_artefact(
+    provenance: Provenance, source: str, changes: Sequence[str] = ()
+) -> LoadedCell:
+    """Load the cell that an artefact was made from.
+
+    Parameters
+    ----------
+    provenance : Provenance
+    source : str
+        The artefact, for messages.
+    changes : sequence of str
+        Overrides to be made now.
+    """
+    return cell_from_json(
+        provenance.cell_resolved_json,
+        urdf=provenance.urdf,
+        srdf=provenance.srdf,
+        text=provenance.cell_yaml,
+        overrides=provenance.overrides,
+        changes=changes,
+        files_sha256=provenance.files_sha256,
+        source=source,
+    )
+
+
+IN_PROCESS = RunOptions()

@@ -1,0 +1,196 @@
+"""``workspace-scan``: a cell goes in, a workspace map comes out."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from reachmap.cell.loading import read_cell
+from reachmap.core.scene import Scene
+from reachmap.errors import SettingsError
+from reachmap.maps import (
+    RunClock,
+    Status,
+    WorkspaceMap,
+    check_output,
+    write_workspace_map,
+)
+from reachmap.sampling.frames import workspace_frames
+from reachmap.scans.document import checking_settings, roadmap_settings, scan_document
+from reachmap.scans.progress import Progress
+from reachmap.scans.run import run_scan
+from reachmap.scans.survey import survey_frames
+from reachmap.scans.survey_run import SurveyContext, run_survey
+from reachmap.scans.workspace_per_frame import per_frame_work, plan_frames
+from reachmap.scans.workspace_results import assemble_workspace_map
+from reachmap.scans.workspace_roadmap import connect_survey, results_of_connection
+from reachmap.tools.options import IN_PROCESS, RunOptions, with_seed
+
+if TYPE_CHECKING:
+    from reachmap.cell.loading import LoadedCell
+
+METHODS = ("roadmap", "per-frame")
+SAMPLE_FRAMES = 200
+
+
+def workspace_scan(
+    cell: str,
+    output: Path,
+    *,
+    method: str = "roadmap",
+    with_bin: bool = False,
+    overrides: Sequence[str] = (),
+    seed: int | None = None,
+    run: RunOptions = IN_PROCESS,
+) -> WorkspaceMap | None:
+    """Map what the arm reaches around its base.
+
+    Parameters
+    ----------
+    cell : str
+        Shipped name or path.
+    output : Path
+        The artefact to write.
+    method : {"roadmap", "per-frame"}
+    with_bin : bool
+        Leave the bin in the scene; it is what is to be placed, so by default it is
+        absent.
+    overrides : sequence of str
+        ``key.path=value``.
+    seed : int, optional
+        Instead of the cell's.
+    run : RunOptions
+
+    Returns
+    -------
+    WorkspaceMap or None
+        What was written; None for a shard, whose journal waits to be merged.
+
+    Raises
+    ------
+    ReachmapError
+        See :mod:`reachmap.errors`.
+    """
+    if method not in METHODS:
+        raise SettingsError(f"method {method!r}: expected {' or '.join(METHODS)}")
+    if method == "roadmap" and run.shard is not None:
+        raise SettingsError(
+            "--shard splits the per-frame method; the roadmap method looks at all "
+            "frames together (leave out --shard, or add --method per-frame)"
+        )
+    loaded = read_cell(cell, with_seed(overrides, seed))
+    scene = Scene.build(loaded, with_bin=with_bin)
+    scene.require_free_scan_configuration()
+    document = scan_document(
+        scene, kind="workspace_map", method=method, settings=_settings(scene, method)
+    )
+    if method == "per-frame":
+        outcome = run_scan(
+            per_frame_work(loaded, document, with_bin=with_bin),
+            output=output,
+            workers=run.workers,
+            executor=run.executor,
+            shard=run.shard,
+            restart=run.restart,
+            overwrite=run.overwrite,
+            progress=Progress("workspace-scan", quiet=run.quiet),
+        )
+        return outcome.artefact  # type: ignore[no-any-return]
+    check_output(output, overwrite=run.overwrite)
+    workspace = _scan_by_roadmap(scene, document, run)
+    write_workspace_map(output, workspace, overwrite=run.overwrite)
+    return workspace
+
+
+def _scan_by_roadmap(
+    scene: Scene, document: dict[str, Any], run: RunOptions
+) -> WorkspaceMap:
+    clock = RunClock(workers=run.workers)
+    with clock.phase("survey"):
+        survey = run_survey(
+            _survey_context(scene.loaded, with_bin=scene.with_bin),
+            workers=run.workers,
+            executor=run.executor,
+            progress=Progress("workspace-scan survey", quiet=run.quiet),
+        )
+    spec = scene.loaded.cell.workspace_scan
+    with clock.phase("connect"):
+        connection = connect_survey(
+            scene, survey, attempts=spec.repeats, seed=scene.loaded.cell.seed
+        )
+    results = results_of_connection(survey, connection)
+    return assemble_workspace_map(document, results, run=clock.finish())
+
+
+def _survey_context(loaded: LoadedCell, *, with_bin: bool) -> SurveyContext:
+    cell = loaded.cell
+    cubes = workspace_frames(cell.workspace_scan, cell.robot.tcp.approach_axis)
+    return SurveyContext(
+        loaded=loaded,
+        with_bin=with_bin,
+        grids=tuple(cube.frames for cube in cubes),
+        approach_m=0.0,
+    )
+
+
+def _settings(scene: Scene, method: str) -> dict[str, Any]:
+    spec = scene.loaded.cell.workspace_scan
+    how = (
+        roadmap_settings()
+        if method == "roadmap"
+        else {"planner": scene.loaded.cell.planner.model_dump(mode="json")}
+    )
+    return {**checking_settings(scene), **how, "repeats": spec.repeats}
+
+
+def summary_of_workspace(workspace: WorkspaceMap | None) -> dict[str, Any]:
+    """Headline of a map: frames, best level, percentages; empty for a shard."""
+    if workspace is None:
+        return {}
+    level = workspace.path_reachability.mean(axis=(1, 2))
+    best = int(np.nanargmax(level))
+    status = np.concatenate([c.status.ravel() for c in workspace.cubes.values()])
+    return {
+        "frames": len(status),
+        "path_reachable_frames": int((status == Status.PATH_FOUND).sum()),
+        "best_level_m": float(workspace.z[best]),
+        "best_level_percent": round(float(level[best]), 2),
+        "squares_at_100_percent": int((workspace.path_reachability[best] == 100).sum()),
+    }
+
+
+def estimate_workspace_scan(
+    cell: str, *, method: str, overrides: Sequence[str], run: RunOptions
+) -> dict[str, Any]:
+    """Say what a scan would do, timed on a few frames; nothing is written."""
+    loaded = read_cell(cell, overrides)
+    scene = Scene.build(loaded, with_bin=False)
+    scene.require_free_scan_configuration()
+    poses = np.concatenate(
+        [
+            cube.frames.transforms().reshape(-1, 4, 4)
+            for cube in workspace_frames(
+                loaded.cell.workspace_scan, loaded.cell.robot.tcp.approach_axis
+            )
+        ]
+    )
+    rows = np.random.default_rng(0).permutation(len(poses))[:SAMPLE_FRAMES]
+    begin = time.perf_counter()
+    if method == "per-frame":
+        plan_frames(scene, poses[rows], rows.tolist())
+    else:
+        connect_survey(
+            scene, survey_frames(scene, poses[rows], 0.0), attempts=1, seed=0
+        )
+    seconds = (time.perf_counter() - begin) / len(rows) * len(poses)
+    workers = run.workers if method == "per-frame" else 1
+    return {
+        "cell": loaded.cell.name,
+        "method": method,
+        "frames": len(poses),
+        "estimated_s": round(seconds / workers, 1),
+    }
