@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from xml.etree import ElementTree
+
 import numpy as np
 import pytest
 from kinematics_arms import (
     KINOVA,
     PANDA,
+    UR5,
+    UR5_JOINTS,
     Link,
     misses,
     nearest_branch,
@@ -209,3 +213,55 @@ def test_an_arm_without_closed_form_is_refused_if_one_is_demanded() -> None:
     assert Kinematics(arm).method == "numeric"
     with pytest.raises(SceneError, match="no closed form"):
         Kinematics(arm, IkSpec(method="analytic"))
+
+
+@pytest.mark.parametrize("seed", range(830, 850))
+def test_arms_at_random_are_solved_or_declined(seed: int) -> None:
+    """Axes and offsets along x, y, z: whatever is taken as known finds originals."""
+    rng = np.random.default_rng(seed)
+    dof = int(rng.integers(1, 7))
+    links = [
+        Link(xyz=rng.choice([0, 0, 0.2, 0.3], 3), axis=np.eye(3)[rng.integers(3)])
+        for _ in range(dof)
+    ]
+    tcp = {"parent": f"link_{dof}", "xyz": rng.choice([0, 0.1, 0.25], 3).tolist()}
+    arm = robot(serial_urdf(links), tcp)
+    kinematics = Kinematics(arm, IkSpec(restarts=1))
+    if not kinematics.complete:
+        return
+    Q = rng.uniform(-3, 3, (40, dof))
+    T = kinematics.forward_many(Q)
+    found, frame = kinematics.solve_many(T)
+    assert nearest_branch(found, frame, Q).max() < 1e-5
+    assert misses(arm, found, T[frame]).max() < 1e-6
+    T[:, :3, 3] *= 3.0
+    found, frame = kinematics.solve_many(T)
+    assert misses(arm, found, T[frame]).max(initial=0.0) < 1e-6
+
+
+def calibrated(urdf: str, size: float, seed: int) -> str:
+    """Shift and tilt the joints of a UR5 by normal noise [m and rad]."""
+    rng = np.random.default_rng(seed)
+    root = ElementTree.fromstring(urdf)
+    for name in UR5_JOINTS:
+        origin = root.find(f"joint[@name='{name}']/origin")
+        assert origin is not None
+        for key in ("xyz", "rpy"):
+            values = np.array(origin.get(key, "0 0 0").split(), float)
+            moved = values + size * rng.normal(size=3)
+            origin.set(key, " ".join(repr(float(v)) for v in moved))
+    return ElementTree.tostring(root, encoding="unicode")
+
+
+@pytest.mark.parametrize("size", [1e-9, 1e-4, 5e-4])
+def test_calibrated_arms_start_from_the_nominal_one(size: float) -> None:
+    """Axes that are nearly parallel: all poses solved, nearly all branches found."""
+    arm = robot(calibrated(urdf_text(UR5), size, seed=1), "tool0")
+    kinematics = Kinematics(arm)
+    assert (kinematics.method, kinematics.complete) == ("nominal-analytic", False)
+    Q = np.random.default_rng(10).uniform(-np.pi, np.pi, (200, 6))
+    T = kinematics.forward_many(Q)
+    found, frame = kinematics.solve_many(T, windings=False)
+    assert len(np.unique(frame)) == len(Q)
+    assert (nearest_branch(found, frame, Q) < 1e-6).mean() >= 0.97
+    assert misses(arm, found, T[frame]).max() < 1e-6
