@@ -1,1 +1,39 @@
-"""Grasp lists, the nearest test grasp, the cost J, the re-ordering."""
+"""Grasp lists, the nearest test grasp, the cost J, the re-ordering.
+
+A picking loop needs three names of this package::
+
+    ranker = Ranker.from_map("bin.h5")                 # once
+    ranking = ranker.rank(points, directions)          # for each image
+    best = ranking.order[0]
+
+and for lists as documents :func:`read_grasps`, :func:`rank_list` and
+:func:`ranked_document`. Nothing here plans: no kinematics, collision or planning
+engine is imported.
+"""
+
+from __future__ import annotations
+
+from reachmap.ranking.approach import align, rotation_between
+from reachmap.ranking.grasp_arrays import GraspList
+from reachmap.ranking.grasps import grasps_from_document, read_grasps
+from reachmap.ranking.order import OUTSIDE_MAP, Ranking
+from reachmap.ranking.pipeline import rank_list
+from reachmap.ranking.ranked_list import RankedList, document_text, ranked_document
+from reachmap.ranking.ranker import Ranker
+from reachmap.ranking.settings import RankSettings
+
+__all__ = [
+    "OUTSIDE_MAP",
+    "GraspList",
+    "RankSettings",
+    "RankedList",
+    "Ranker",
+    "Ranking",
+    "align",
+    "document_text",
+    "grasps_from_document",
+    "rank_list",
+    "ranked_document",
+    "read_grasps",
+    "rotation_between",
+]

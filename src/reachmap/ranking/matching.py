@@ -136,9 +136,7 @@ def match_at(
     )
 
 
-def tied(
-    query: Queries, table: GraspTable, tree: cKDTree
-) -> tuple[IntArray, IntArray, FloatArray, FloatArray]:
+def tied(query: Queries, table: GraspTable, tree: cKDTree) -> tuple[IntArray, IntArray]:
     """List the test grasps that tie for one grasp, in map order.
 
     Parameters
@@ -149,16 +147,10 @@ def tied(
     Returns
     -------
     point, orientation : int array, shape (t,)
-    distance, angle : array, shape (t,)
     """
-    distance, point, angles = _candidates(query, np.array([0]), table, tree)
+    _, point, angles = _candidates(query, np.array([0]), table, tree)
     column, orientation = np.nonzero(angles[0] <= angles.min() + TIE_RAD)
-    return (
-        point[0, column],
-        orientation,
-        distance[0, column],
-        angles[0, column, orientation],
-    )
+    return point[0, column], orientation
 
 
 def _rematch(

@@ -2,81 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Final
 
 import numpy as np
 
-from reachmap._typing import BoolArray, CodeArray, FloatArray, IntArray
-from reachmap.errors import SettingsError
-from reachmap.geometry import quaternion_wxyz_from_rotation
-from reachmap.maps.records import BinMap, freeze
-from reachmap.ranking.approach import axis_vector, complete_rotation
+from reachmap._typing import FloatArray, IntArray
+from reachmap.maps.bin_file import read_bin_map
+from reachmap.maps.records import BinMap, Stamp
 from reachmap.ranking.costs import (
     blended_terms,
     grasp_costs,
     likeness_terms,
     outside_map,
 )
-from reachmap.ranking.matching import Matches, Queries, build_tree, match
+from reachmap.ranking.frames import frames_of
+from reachmap.ranking.matching import Matches, Queries, build_tree, match, tied
+from reachmap.ranking.order import OUTSIDE_MAP, Ranking, stable_order
+from reachmap.ranking.queries import queries_from_arrays
 from reachmap.ranking.settings import RankSettings, Roll
 from reachmap.ranking.table import GraspTable, table_from_bin_map
-
-OUTSIDE_MAP: Final = 254
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Ranking:
-    """The order of a list of grasps, and why. Rows are in supplied order.
-
-    Attributes
-    ----------
-    order : int array, shape (n,)
-        Supplied numbers of the grasps, best first; unreachable ones last in their
-        supplied order.
-    cost : array, shape (n,)
-        J; inf where unreachable.
-    terms : array, shape (n, 4)
-        α φ3, β φ4, δ φ5, ε φ6, which add up to J; NaN where unreachable.
-    status : uint8 array, shape (n,)
-        :class:`reachmap.maps.records.Status` of the test grasp, or ``OUTSIDE_MAP``.
-    test_grasp : int array, shape (n, 4)
-        Layer, y, x, orientation of the nearest test grasp.
-    distance : array, shape (n,)
-        φ1 [m].
-    angle : array, shape (n,)
-        φ2 [rad]; between approach axes where the roll is free.
-    roll_free : bool array, shape (n,)
-    orientation_wxyz : array, shape (n, 4)
-        R_test of the test grasp in robot_base: the tool orientation to use.
-    """
-
-    order: IntArray
-    cost: FloatArray
-    terms: FloatArray
-    status: CodeArray
-    test_grasp: IntArray
-    distance: FloatArray
-    angle: FloatArray
-    roll_free: BoolArray
-    orientation_wxyz: FloatArray
-
-    def __post_init__(self) -> None:
-        freeze(self)
-
-    @property
-    def rank(self) -> IntArray:
-        """Rank of each grasp, from 1, in supplied order; shape (n,)."""
-        rank = np.empty(len(self.order), np.int64)
-        rank[self.order] = np.arange(1, len(self.order) + 1)
-        return rank
-
-    @property
-    def reachable(self) -> BoolArray:
-        """Where the cost is finite, shape (n,)."""
-        return np.isfinite(self.cost)
 
 
 class Ranker:
@@ -93,10 +38,16 @@ class Ranker:
     ----------
     table : GraspTable
         The test grasps with their costs.
+    frames : mapping
+        Frames that grasp lists may be in, as poses in robot_base.
+    stamp : Stamp
+        Identity of the map.
     """
 
     def __init__(self, bin_map: BinMap) -> None:
         self.table: GraspTable = table_from_bin_map(bin_map)
+        self.frames: Mapping[str, FloatArray] = frames_of(bin_map)
+        self.stamp: Stamp = bin_map.stamp
         self._tree = build_tree(self.table)
 
     @classmethod
@@ -108,8 +59,6 @@ class Ranker:
         MapFileError
             The file is not a readable bin map.
         """
-        from reachmap.maps import read_bin_map
-
         return cls(read_bin_map(Path(path)))
 
     def rank(
@@ -151,43 +100,10 @@ class Ranker:
             Arrays that do not fit together or are not finite; weights out of range.
         """
         settings = RankSettings.of(weights, likeness, neighbours, roll)
-        queries = self.queries(points, directions, rotations, roll=settings.roll)
-        return self.rank_queries(queries, settings, scores)
-
-    def queries(
-        self,
-        points: FloatArray,
-        directions: FloatArray | None = None,
-        rotations: FloatArray | None = None,
-        *,
-        roll: Roll = "as-given",
-    ) -> Queries:
-        """Check arrays and say for each grasp whether its roll counts."""
-        p = _array(points, "points", (3,), None)
-        n = len(p)
-        if directions is None and rotations is None:
-            raise SettingsError("give directions or rotations")
-        R = np.full((n, 3, 3), np.nan) if rotations is None else rotations
-        R = _array(R, "rotations", (3, 3), n, finite=False)
-        known: BoolArray = np.all(np.isfinite(R), axis=(1, 2))
-        _check_rotations(R[known])
-        axes = R @ axis_vector(self.table.approach_axis)
-        if not known.all():
-            if directions is None:
-                raise SettingsError("rotations that are NaN need directions")
-            given = _array(directions, "directions", (3,), n, finite=False)
-            axes = np.where(known[:, None], axes, _unit(given))
-        if not np.isfinite(axes).all():
-            raise SettingsError("directions must be finite and longer than 0")
-        free: BoolArray = ~known if roll == "as-given" else np.full(n, roll == "free")
-        if roll == "fixed" and not known.all():
-            R = R.copy()
-            R[~known] = complete_rotation(
-                axes[~known], self.table.bin_pose[:3, :3], self.table.approach_axis
-            )
-        return Queries(
-            points=p, axes=axes, quaternions=_quaternions(R, free), free=free
+        queries = queries_from_arrays(
+            self.table, points, directions, rotations, roll=settings.roll
         )
+        return self.rank_queries(queries, settings, scores)
 
     def rank_queries(
         self,
@@ -214,8 +130,17 @@ class Ranker:
             distance=matches.distance,
             angle=matches.angle,
             roll_free=queries.free.copy(),
-            orientation_wxyz=table.quaternions[matches.point, matches.orientation],
+            orientation_wxyz=table.quaternions[matches.point, matches.orientation]
+            + 0.0,
         )
+
+    def tied(self, query: Queries) -> tuple[IntArray, IntArray]:
+        """Points and orientations of the test grasps that tie for one grasp."""
+        return tied(query, self.table, self._tree)
+
+    def test_costs(self, weights: tuple[float, float, float]) -> FloatArray:
+        """J of every test grasp, shape (points, orientations); inf if unreachable."""
+        return grasp_costs(self.table, weights)
 
     def _terms(
         self,
@@ -243,58 +168,6 @@ class Ranker:
         return terms
 
 
-def stable_order(cost: FloatArray, scores: FloatArray | None = None) -> IntArray:
-    """Order of costs, shape (n,): ties by score, higher first, then as supplied.
-
-    Costs that differ by rounding only, beyond the twelfth decimal, tie. Infinite costs
-    come last in supplied order whatever their scores; so do missing (NaN) scores among
-    ties.
-    """
-    key = np.round(cost, 12)
-    if scores is None:
-        return np.argsort(key, kind="stable")
-    worst_first = np.where(np.isnan(scores), -np.inf, scores)
-    second = np.where(np.isfinite(cost), -worst_first, 0.0)
-    return np.lexsort((second, key))
-
-
 def _unravelled(matches: Matches, table: GraspTable) -> IntArray:
     place = np.unravel_index(matches.point, table.shape[:3])
     return np.stack([*place, matches.orientation], axis=1)
-
-
-def _array(
-    value: FloatArray,
-    name: str,
-    row: tuple[int, ...],
-    n: int | None,
-    *,
-    finite: bool = True,
-) -> FloatArray:
-    array = np.asarray(value, dtype=float)
-    if array.shape[1:] != row or array.ndim == 0 or (n is not None and len(array) != n):
-        wanted = ("n" if n is None else n, *row)
-        raise SettingsError(f"{name} must have the shape {wanted} (got {array.shape})")
-    if finite and not np.isfinite(array).all():
-        raise SettingsError(f"{name} must be finite")
-    return array
-
-
-def _check_rotations(R: FloatArray) -> None:
-    skew = np.abs(np.swapaxes(R, 1, 2) @ R - np.eye(3)).max(initial=0.0)
-    if skew > 1e-2 or (np.linalg.det(R) < 0).any():
-        raise SettingsError("rotations must be orthonormal with determinant +1")
-
-
-def _unit(directions: FloatArray) -> FloatArray:
-    length = np.linalg.norm(directions, axis=1, keepdims=True)
-    return directions / np.where(length > 0, length, np.nan)
-
-
-def _quaternions(R: FloatArray, free: BoolArray) -> FloatArray:
-    quaternions = np.zeros((len(R), 4))
-    quaternions[:, 0] = 1.0
-    fixed = ~free
-    if fixed.any():
-        quaternions[fixed] = quaternion_wxyz_from_rotation(R[fixed])
-    return quaternions

@@ -1,0 +1,173 @@
+"""``reachmap rank``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Literal
+
+import click
+
+from reachmap.cli import options
+
+FORMATS = (
+    "reachmap",
+    "isaac_grasp",
+    "graspgen",
+    "graspnet",
+    "suction",
+    "suction-normal-first",
+    "suction-point-first",
+)
+AXES = ("+x", "-x", "+y", "-y", "+z", "-z")
+
+
+@click.command("rank")
+@click.argument("grasps", nargs=-1, required=True, metavar="GRASPS...")
+@click.option(
+    "--map",
+    "map_path",
+    type=options.INPUT_FILE,
+    default="bin.h5",
+    show_default=True,
+    help="The bin map to look costs up in.",
+)
+@options.output_option(
+    help="Write the ranked list here and print a table; a folder takes one file for "
+    "each list. Without it, and with -, the JSON is printed."
+)
+@click.option(
+    "--weights",
+    nargs=3,
+    type=float,
+    default=(1.0, 1.0, 1.0),
+    show_default=True,
+    metavar="α β δ",
+    help="Weights of path length, planning time and execution time.",
+)
+@click.option(
+    "--likeness",
+    type=float,
+    default=0.0,
+    show_default=True,
+    metavar="ε",
+    help="Weight of the distance between grasp and test grasp.",
+)
+@click.option(
+    "--neighbours",
+    type=click.IntRange(1, 64),
+    default=1,
+    show_default=True,
+    help="Blend the costs of so many test points; 1 takes the nearest.",
+)
+@click.option(
+    "--roll",
+    type=click.Choice(["as-given", "free", "fixed"]),
+    default="as-given",
+    show_default=True,
+    help="Whether the roll about the approach counts. As given: it is free for grasps "
+    "with a direction and fixed for those with an orientation.",
+)
+@click.option(
+    "--from",
+    "format_name",
+    type=click.Choice(FORMATS),
+    help="Format of the lists; by default their content tells.",
+)
+@click.option("--frame", metavar="NAME", help="Frame of imported lists.")
+@click.option(
+    "--frame-pose",
+    nargs=7,
+    type=float,
+    metavar="X Y Z QW QX QY QZ",
+    help="Pose in robot_base of the lists' frame, when the cell does not know it: a "
+    "camera on the wrist, an object.",
+)
+@click.option(
+    "--approach-axis",
+    type=click.Choice(AXES),
+    help="Approach axis of imported orientations, instead of their format's.",
+)
+@options.cell_option
+@options.set_option
+@click.option(
+    "--force", is_flag=True, help="Rank even if the map was made for another cell."
+)
+@click.option(
+    "--top", type=click.IntRange(min=1), metavar="N", help="Keep only the N best."
+)
+@click.option("--explain", metavar="ID", help="Tell the story of one grasp instead.")
+@click.option(
+    "--chart",
+    type=options.OUTPUT_PATH,
+    metavar="PATH",
+    help="Draw the costs of the first grasps, as supplied and re-ranked.",
+)
+@click.option(
+    "--chart-top",
+    type=click.IntRange(min=1),
+    default=10,
+    show_default=True,
+    help="How many of the first grasps the chart averages.",
+)
+@options.overwrite_option
+def command(
+    grasps: tuple[str, ...],
+    map_path: Path,
+    output: Path | None,
+    weights: tuple[float, float, float],
+    likeness: float,
+    neighbours: int,
+    roll: Literal["as-given", "free", "fixed"],
+    format_name: str | None,
+    frame: str | None,
+    frame_pose: tuple[float, ...] | None,
+    approach_axis: str | None,
+    cell: str | None,
+    overrides: tuple[str, ...],
+    force: bool,
+    top: int | None,
+    explain: str | None,
+    chart: Path | None,
+    chart_top: int,
+    overwrite: bool,
+) -> None:
+    """Re-order grasp lists by cost, using the bin map alone.
+
+    Each grasp gets the cost of the nearest test grasp: mean path length, planning time
+    and execution time, normalised and weighted. Unreachable grasps come last, with the
+    cause. GRASPS are files, or - for standard input; the answer is JSON.
+
+    \b
+    Example:
+      reachmap rank grasps.json -o ranked.json --chart ranking.png
+      network | reachmap rank - --top 10 | robot
+      reachmap rank grasps.json --explain NW-12
+    """
+    from reachmap.ranking.settings import RankSettings
+    from reachmap.tools.rank import ListFormat, rank
+
+    to_stdout = output is None or str(output) == "-"
+    answer = rank(
+        grasps,
+        map_path=map_path,
+        output=None if to_stdout else output,
+        settings=RankSettings(
+            weights=weights, likeness=likeness, neighbours=neighbours, roll=roll
+        ),
+        list_format=ListFormat(
+            name=format_name,
+            frame=frame,
+            frame_pose=frame_pose,
+            approach_axis=approach_axis,
+        ),
+        cell=cell,
+        overrides=overrides,
+        force=force,
+        top=top,
+        explain=explain,
+        chart=chart,
+        chart_top=chart_top,
+        overwrite=overwrite,
+    )
+    text = answer.explanation or (answer.text if to_stdout else answer.table)
+    click.echo(text.rstrip("\n"))

@@ -1,0 +1,162 @@
+"""Cost of the first grasps, as supplied and re-ranked: the paper's Fig. 7."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+
+from reachmap._typing import FloatArray
+from reachmap.errors import SettingsError
+from reachmap.plots.style import (
+    INK,
+    MUTED,
+    NOT_ATTEMPTED,
+    RULE,
+    axes_at,
+    drawing,
+    new_figure,
+    put_title,
+)
+
+TERM_LABELS: Final = ("path length", "planning time", "execution time", "likeness")
+TERM_COLOURS: Final = ("#2f6db3", "#e69f00", "#3d9970", "#9467bd")
+MAX_GROUPS: Final = 24
+BAR_WIDTH: Final = 0.38
+PLACES: Final = (-0.21, 0.21)
+ORDERS: Final = ("as supplied", "re-ranked")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CostGroup:
+    """Costs of one list, or of one quadrant of it.
+
+    Attributes
+    ----------
+    label : str
+    supplied, ranked : array, shape (n, t)
+        Summands of J in either order; a row of NaN is an unreachable grasp.
+    """
+
+    label: str
+    supplied: FloatArray
+    ranked: FloatArray
+
+
+def ranking_chart(
+    groups: Sequence[CostGroup], top: int = 10, *, subtitle: str = ""
+) -> Figure:
+    """Draw the mean cost of the first grasps in either order, stacked by term.
+
+    A mean over unreachable grasps would be infinite: the bar is then grey to the top
+    of the chart, the coloured part is the mean of the reachable ones, and the number
+    of unreachable ones is written on it.
+
+    Parameters
+    ----------
+    groups : sequence of CostGroup
+    top : int
+        How many of the first grasps are averaged.
+    subtitle : str
+
+    Returns
+    -------
+    Figure
+    """
+    if not groups or top < 1:
+        raise SettingsError("a chart needs grasps, and a top of 1 or more")
+    if len(groups) > MAX_GROUPS:
+        raise SettingsError(f"{len(groups)} groups; a chart takes {MAX_GROUPS}")
+    with drawing():
+        width = max(6.4, 1.6 + 1.45 * len(groups))
+        figure = new_figure(width, 5.0)
+        put_title(figure, 0.75, _title(groups, top), subtitle)
+        axes = axes_at(figure, 0.75, 0.95, width - 0.95, 3.15)
+        limit = 1.22 * max(_tallest(groups, top), 1e-3)
+        for place, group in enumerate(groups):
+            for shift, terms in zip(
+                PLACES, (group.supplied, group.ranked), strict=True
+            ):
+                _draw_bar(axes, place + shift, terms[:top], limit)
+        _finish(axes, groups, top, limit)
+        _legend(figure, groups)
+    return figure
+
+
+def _title(groups: Sequence[CostGroup], top: int) -> str:
+    most = max(len(group.supplied) for group in groups)
+    return f"Mean cost of the first {min(top, most)} grasps, as supplied and re-ranked"
+
+
+def _tallest(groups: Sequence[CostGroup], top: int) -> float:
+    means = [
+        _means(terms[:top]).sum()
+        for group in groups
+        for terms in (group.supplied, group.ranked)
+    ]
+    return float(max(means))
+
+
+def _means(terms: FloatArray) -> FloatArray:
+    """Mean of each term over the reachable grasps, shape (t,); 0 if there are none."""
+    reachable = terms[~np.isnan(terms).any(axis=1)]
+    return reachable.mean(axis=0) if len(reachable) else np.zeros(terms.shape[1])
+
+
+def _draw_bar(axes: Axes, x: float, terms: FloatArray, limit: float) -> None:
+    unreachable = int(np.isnan(terms).any(axis=1).sum())
+    if unreachable:
+        axes.bar(x, limit, BAR_WIDTH, color=NOT_ATTEMPTED, zorder=1)
+        text = f"{unreachable} of {len(terms)}\nunreachable"
+        axes.text(
+            x, limit * 0.985, text, ha="center", va="top", fontsize=6.6, color=INK
+        )
+    bottom = 0.0
+    for value, colour in zip(_means(terms), TERM_COLOURS, strict=False):
+        axes.bar(x, value, BAR_WIDTH, bottom=bottom, color=colour, zorder=2)
+        bottom += float(value)
+    if unreachable < len(terms):
+        axes.text(
+            x, bottom + 0.012 * limit, f"{bottom:.2f}", ha="center", va="bottom",
+            fontsize=7.6, color=INK, zorder=3,
+        )  # fmt: skip
+
+
+def _finish(axes: Axes, groups: Sequence[CostGroup], top: int, limit: float) -> None:
+    axes.set_ylim(0.0, limit)
+    axes.set_xlim(-0.6, len(groups) - 0.4)
+    axes.set_ylabel("mean J")
+    places = [place + shift for place in range(len(groups)) for shift in PLACES]
+    axes.set_xticks(places, ["supplied", "re-ranked"] * len(groups), fontsize=6.8)
+    axes.tick_params(axis="x", length=0)
+    for place, group in enumerate(groups):
+        count = len(group.supplied)
+        label = group.label if count >= top else f"{group.label} (only {count})"
+        axes.annotate(
+            label, (place, 0.0), xytext=(0, -22), textcoords="offset points",
+            ha="center", va="top", fontsize=9.0, fontweight="bold", color=INK,
+            annotation_clip=False,
+        )  # fmt: skip
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.yaxis.grid(visible=True, color=RULE, linewidth=0.4, alpha=0.5)
+    axes.set_axisbelow(True)
+
+
+def _legend(figure: Figure, groups: Sequence[CostGroup]) -> None:
+    count = groups[0].supplied.shape[1]
+    left = 0.75 / float(figure.get_size_inches()[0])
+    named = zip(TERM_COLOURS[:count], TERM_LABELS[:count], strict=True)
+    handles = [Patch(color=colour, label=label) for colour, label in named]
+    handles.append(
+        Patch(color=NOT_ATTEMPTED, label="unreachable grasps: the mean is infinite")
+    )
+    figure.legend(
+        handles=handles, loc="lower left", ncols=len(handles), labelcolor=MUTED,
+        bbox_to_anchor=(left, 0.01), borderaxespad=0.0, columnspacing=1.2,
+        handlelength=1.1, fontsize=7.4,
+    )  # fmt: skip

@@ -1,0 +1,262 @@
+"""``reachmap rank``: grasp lists and a bin map in, re-ordered grasp lists out."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from reachmap.errors import MapFileError, SettingsError
+from reachmap.maps import read_bin_map
+from reachmap.maps.publish import check_output, publish
+from reachmap.maps.records import BinMap
+from reachmap.ranking.cost_groups import cost_groups
+from reachmap.ranking.explain import explanation, find_grasp
+from reachmap.ranking.grasp_arrays import GraspList
+from reachmap.ranking.grasps import STDIN, read_grasps
+from reachmap.ranking.order import OUTSIDE_MAP
+from reachmap.ranking.pipeline import pose_from_numbers, rank_list
+from reachmap.ranking.rank_files import check_targets, joined, write_lists
+from reachmap.ranking.rank_text import TABLE_ROWS, ranking_table
+from reachmap.ranking.ranked_list import RankedList, document_text, ranked_document
+from reachmap.ranking.ranker import Ranker
+from reachmap.ranking.settings import RankSettings
+
+logger = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ListFormat:
+    """How grasp lists are to be read, where they do not say so themselves.
+
+    Attributes
+    ----------
+    name : str or None
+        One of :data:`reachmap.ranking.importers.FORMATS`; None looks at the content.
+    frame : str or None
+        Frame of imported lists.
+    frame_pose : sequence of 7 float, or None
+        Pose of the lists' frame in robot_base: x, y, z [m], quaternion wxyz.
+    approach_axis : str or None
+        Approach axis of imported orientations.
+    """
+
+    name: str | None = None
+    frame: str | None = None
+    frame_pose: Sequence[float] | None = None
+    approach_axis: str | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RankAnswer:
+    """What a ranking gives back.
+
+    Attributes
+    ----------
+    documents : tuple of mapping
+        One re-ordered grasp list for each one supplied.
+    text : str
+        The documents as JSON: one, or a list of several.
+    table : str
+        The best of each list, for a terminal.
+    explanation : str
+        The story of the grasp that was asked about, or "".
+    written : tuple of Path
+    """
+
+    documents: tuple[Mapping[str, Any], ...]
+    text: str
+    table: str
+    explanation: str = ""
+    written: tuple[Path, ...] = ()
+
+
+def rank(
+    sources: Sequence[str | Path],
+    *,
+    map_path: str | Path = "bin.h5",
+    output: Path | None = None,
+    settings: RankSettings | None = None,
+    list_format: ListFormat | None = None,
+    cell: str | None = None,
+    overrides: Sequence[str] = (),
+    force: bool = False,
+    top: int | None = None,
+    explain: str | None = None,
+    chart: Path | None = None,
+    chart_top: int = 10,
+    overwrite: bool = False,
+) -> RankAnswer:
+    """Re-order grasp lists by the cost of reaching them.
+
+    Parameters
+    ----------
+    sources : sequence of path
+        Grasp lists; ``-`` is standard input.
+    map_path : path
+        A bin map.
+    output : Path, optional
+        A file, or a folder for one file each; several lists in one file make a JSON
+        list. Nothing is written by default.
+    settings : RankSettings, optional
+    list_format : ListFormat, optional
+    cell, overrides : str, sequence of str
+        A cell the map must have been made for.
+    force : bool
+        Rank even if it was made for another.
+    top : int, optional
+        Keep only so many of the best of each list.
+    explain : str, optional
+        Id of a grasp whose story is wanted.
+    chart : Path, optional
+        A picture (.png or .svg) of the costs of the first ``chart_top`` grasps.
+    overwrite : bool
+
+    Raises
+    ------
+    GraspListError, MapFileError, SettingsError, OutputError
+    """
+    settings, list_format = settings or RankSettings(), list_format or ListFormat()
+    _check_request(sources, top, chart_top)
+    targets = check_targets(sources, output, overwrite=overwrite)
+    _check_chart(chart, overwrite=overwrite)
+    bin_map = read_bin_map(Path(map_path))
+    if cell is not None:
+        _check_cell(bin_map, map_path, cell, overrides, force=force)
+    lists = [_read(source, list_format) for source in sources]
+    ranker = Ranker(bin_map)
+    ranked = [_rank_one(grasps, ranker, settings, list_format) for grasps in lists]
+    story = ""
+    if explain is not None:
+        story = explanation(*find_grasp(ranked, explain), ranker, bin_map)
+    documents = [ranked_document(one, top) for one in ranked]
+    texts = [document_text(document) for document in documents]
+    write_lists(targets, texts, overwrite=overwrite)
+    if chart is not None:
+        _draw(
+            chart, ranked, bin_map.stamp.config_sha256, chart_top, overwrite=overwrite
+        )
+    return RankAnswer(
+        documents=tuple(documents),
+        text=joined(texts),
+        table="\n\n".join(_tables(ranked, top)),
+        explanation=story,
+        written=(*targets, *([] if chart is None else [chart])),
+    )
+
+
+def _check_request(
+    sources: Sequence[str | Path], top: int | None, chart_top: int
+) -> None:
+    if not sources:
+        raise SettingsError("name a grasp list, or - for standard input")
+    if sum(str(source) == STDIN for source in sources) > 1:
+        raise SettingsError("standard input can be read once")
+    for name, value in (("top", top), ("chart-top", chart_top)):
+        if value is not None and value < 1:
+            raise SettingsError(f"{name} must be 1 or more (got {value})")
+
+
+def _check_chart(chart: Path | None, *, overwrite: bool) -> None:
+    if chart is not None:
+        if chart.suffix not in (".png", ".svg"):
+            raise SettingsError(f"{chart}: a chart is a .png or an .svg")
+        check_output(chart, overwrite=overwrite)
+
+
+def _check_cell(
+    bin_map: BinMap,
+    map_path: str | Path,
+    cell: str,
+    overrides: Sequence[str],
+    *,
+    force: bool,
+) -> None:
+    # Imported here: reading cells takes longer than ranking.
+    from reachmap.cell.loading import read_cell
+    from reachmap.ranking.cell_check import differing_sections
+
+    different = differing_sections(bin_map, read_cell(cell, overrides))
+    if not different:
+        return
+    message = f"{map_path}: was made for another cell than {cell}"
+    message += f" (different: {', '.join(different)})"
+    if not force:
+        raise MapFileError(f"{message}; scan again, or rank all the same with --force")
+    logger.warning("%s", message)
+
+
+def _read(source: str | Path, list_format: ListFormat) -> GraspList:
+    # With a pose the frame needs no name that the cell knows.
+    frame = list_format.frame
+    if frame is None and list_format.frame_pose is not None:
+        frame = "given"
+    grasps = read_grasps(
+        source,
+        source_format=list_format.name,
+        frame=frame,
+        approach_axis=list_format.approach_axis,
+    )
+    for warning in grasps.warnings:
+        logger.warning("%s", warning)
+    return grasps
+
+
+def _rank_one(
+    grasps: GraspList, ranker: Ranker, settings: RankSettings, list_format: ListFormat
+) -> RankedList:
+    numbers = list_format.frame_pose
+    T = None if numbers is None else pose_from_numbers(numbers)
+    ranked = rank_list(grasps, ranker, settings=settings, T_base_frame=T)
+    if len(grasps) and (ranked.ranking.status == OUTSIDE_MAP).all():
+        logger.warning(
+            "%s: no grasp lies in the mapped volume; are the frame (%s) and the units "
+            "right?",
+            grasps.source,
+            grasps.frame,
+        )
+    return ranked
+
+
+def _tables(ranked: Sequence[RankedList], top: int | None) -> list[str]:
+    tables = [ranking_table(one, top or TABLE_ROWS) for one in ranked]
+    if len(ranked) == 1:
+        return tables
+    return [
+        f"{one.grasps.source}\n{table}"
+        for one, table in zip(ranked, tables, strict=True)
+    ]
+
+
+def _draw(
+    chart: Path,
+    ranked: Sequence[RankedList],
+    config_sha256: str,
+    top: int,
+    *,
+    overwrite: bool,
+) -> None:
+    # Imported here: drawing takes longer than ranking.
+    from reachmap.plots.ranking import CostGroup, ranking_chart
+    from reachmap.plots.style import figure_bytes
+
+    groups = [
+        CostGroup(label=label, supplied=supplied, ranked=best_first)
+        for label, (supplied, best_first) in cost_groups(ranked).items()
+    ]
+    figure = ranking_chart(groups, top, subtitle=_subtitle(ranked))
+    data = figure_bytes(
+        figure,
+        "svg" if chart.suffix == ".svg" else "png",
+        title="Mean cost of the first grasps",
+        config_sha256=config_sha256,
+    )
+    publish(chart, [data], overwrite=overwrite)
+
+
+def _subtitle(ranked: Sequence[RankedList]) -> str:
+    names = ", ".join(Path(one.grasps.source).name for one in ranked)
+    alpha, beta, delta = ranked[0].settings["weights"]
+    return f"{names} · J with α = {alpha:g}, β = {beta:g}, δ = {delta:g}"

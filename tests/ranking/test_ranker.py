@@ -1,0 +1,436 @@
+"""What a ranker answers: roll, ties, likeness, neighbours, the edge of the map."""
+
+from __future__ import annotations
+
+import dataclasses
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from ranking_maps import make_bin_map
+from scipy.spatial.transform import Rotation
+
+from reachmap.errors import MapFileError, SettingsError
+from reachmap.geometry import (
+    direction_angle,
+    rotation_angle,
+    rotation_from_quaternion_wxyz,
+)
+from reachmap.maps.records import Status
+from reachmap.ranking import OUTSIDE_MAP, Ranker, align, rotation_between
+from reachmap.ranking.approach import axis_vector, tcp_rotation
+from reachmap.ranking.costs import outside_map
+from reachmap.ranking.order import stable_order
+from reachmap.ranking.table import quaternion_angle
+
+BIN_MAP = make_bin_map(seed=7, reachable=0.6)
+RANKER = Ranker(BIN_MAP)
+AXES = ["+x", "-x", "+y", "-y", "+z", "-z"]
+
+
+def in_base(points):
+    """Points of the bin frame in robot_base."""
+    T = BIN_MAP.bin_pose
+    return np.atleast_2d(points) @ T[:3, :3].T + T[:3, 3]
+
+
+def all_reachable(**changes):
+    """A small map in which every attempt succeeded."""
+    bin_map = make_bin_map(seed=3, reachable=1.0, shape=(1, 3, 3))
+    rng = np.random.default_rng(0)
+    shape = bin_map.path_found.shape
+    fields = {
+        name: rng.uniform(0.5, 1.0, shape)
+        for name in ("path_length", "planning_cpu_time", "execution_time")
+    }
+    everywhere = {"path_found": np.ones(shape, np.uint8)}
+    return dataclasses.replace(bin_map, **{**fields, **everywhere, **changes})
+
+
+def test_a_test_grasp_finds_itself():
+    """Ranking the map's own test grasps gives φ1 = φ2 = 0 and their own means."""
+    place = (0, 2, 3)
+    q = BIN_MAP.quaternion_wxyz[place]
+    points = np.tile(BIN_MAP.position[place], (len(q), 1))
+    ranking = RANKER.rank(points, rotations=rotation_from_quaternion_wxyz(q))
+    np.testing.assert_allclose(ranking.distance, 0.0, atol=1e-12)
+    np.testing.assert_allclose(ranking.angle, 0.0, atol=1e-7)
+    assert ranking.test_grasp.tolist() == [[*place, o] for o in range(len(q))]
+    np.testing.assert_array_equal(ranking.status, BIN_MAP.status[place])
+    reached = BIN_MAP.path_found[place].any(axis=-1)
+    np.testing.assert_array_equal(ranking.reachable, reached)
+
+
+def test_terms_are_means_over_successes_divided_by_their_maximum():
+    """Every term lies in [0, 1], reaches 1 somewhere, and the terms add up to J."""
+    m = BIN_MAP
+    found = m.path_found > 0
+    for index, values in enumerate(
+        (m.path_length, m.planning_cpu_time, m.execution_time)
+    ):
+        mean = np.nanmean(np.where(found, values, np.nan)[found.any(-1)], axis=-1)
+        assert RANKER.table.maxima[index] == pytest.approx(mean.max())
+        term = RANKER.table.normalised[..., index]
+        assert np.nanmax(term) == pytest.approx(1.0)
+        assert np.nanmin(term) > 0
+        flat = term.reshape(found.shape[:-1])[found.any(-1)]
+        np.testing.assert_allclose(flat, mean / mean.max())
+    ranking = RANKER.rank(m.position.reshape(-1, 3), np.tile([0, 0, -1.0], (35, 1)),
+                          weights=(0.5, 2.0, 1.0))  # fmt: skip
+    reachable = ranking.reachable
+    np.testing.assert_allclose(
+        ranking.terms[reachable].sum(axis=1), ranking.cost[reachable]
+    )
+
+
+def test_a_direction_takes_the_cheapest_reachable_roll():
+    """Among the rolls of one approach axis the reachable one of least J is chosen."""
+    ranking = RANKER.rank(
+        BIN_MAP.position.reshape(-1, 3), np.tile([0, 0, -1.0], (35, 1))
+    )
+    cost = RANKER.test_costs((1.0, 1.0, 1.0))
+    # Orientations 0, 1, 2 of the family point straight down, at three rolls.
+    np.testing.assert_allclose(ranking.cost, cost[:, :3].min(axis=1))
+    assert (ranking.test_grasp[:, 3] < 3).all()
+    assert ranking.roll_free.all()
+    np.testing.assert_allclose(ranking.angle, 0.0, atol=1e-7)
+
+
+def test_roll_can_be_freed_and_fixed():
+    """A full orientation is compared by Eq. (3), or on its axis when roll is free."""
+    q = BIN_MAP.quaternion_wxyz[0, 1, 1, 1]
+    R = rotation_from_quaternion_wxyz(q)
+    turned = R @ Rotation.from_euler("z", 0.4).as_matrix()
+    point = BIN_MAP.position[0, 1, 1][None]
+    as_given = RANKER.rank(point, rotations=turned[None])
+    assert as_given.angle[0] == pytest.approx(0.4)
+    assert as_given.test_grasp[0].tolist() == [0, 1, 1, 1]
+    free = RANKER.rank(point, rotations=turned[None], roll="free")
+    assert free.angle[0] == pytest.approx(0.0, abs=1e-7)
+    assert free.cost[0] <= as_given.cost[0]
+
+
+def test_a_fixed_roll_of_a_direction_is_the_upright_tool_turned():
+    """Where the family has the direction, its roll 0 is the match, exactly."""
+    orientations = np.arange(0, 27, 3)
+    axes = RANKER.table.axes[10, orientations]
+    points = np.tile(RANKER.table.points[10], (len(axes), 1))
+    ranking = RANKER.rank(points, axes, roll="fixed")
+    assert ranking.test_grasp[:, 3].tolist() == orientations.tolist()
+    np.testing.assert_allclose(ranking.angle, 0.0, atol=1e-7)
+
+
+def test_directions_and_orientations_in_one_list():
+    """Rows without an orientation are roll-free, the others are not."""
+    n = 9
+    points = np.tile(BIN_MAP.position[0, 2, 2], (n, 1))
+    R = rotation_from_quaternion_wxyz(BIN_MAP.quaternion_wxyz[0, 2, 2, :n])
+    v = R[:, :, 2].copy()
+    mixed = R.copy()
+    mixed[::2] = np.nan
+    ranking = RANKER.rank(points, v, mixed)
+    apart = RANKER.rank(points, rotations=R), RANKER.rank(points, v)
+    assert ranking.roll_free.tolist() == [True, False] * 4 + [True]
+    np.testing.assert_array_equal(ranking.cost[1::2], apart[0].cost[1::2])
+    np.testing.assert_array_equal(ranking.cost[::2], apart[1].cost[::2])
+
+
+def test_midway_between_points_the_cheapest_of_the_tied_wins():
+    """Between four grid points all four tie in φ1, whatever the rounding says."""
+    m = all_reachable()
+    ranker = Ranker(m)
+    corners = m.position[0, :2, :2].reshape(-1, 3)
+    middle = corners.mean(axis=0)
+    rng = np.random.default_rng(1)
+    jitter = rng.normal(scale=1e-9, size=(20, 3))
+    ranking = ranker.rank(middle + jitter, np.tile([0, 0, -1.0], (20, 1)))
+    at = [0, 1, 3, 4]
+    cheapest = ranker.test_costs((1, 1, 1))[at][:, :3].min()
+    np.testing.assert_allclose(ranking.cost, cheapest)
+    # Equal costs keep their supplied order although the distances differ.
+    assert ranking.order.tolist() == list(range(20))
+
+
+def test_order_is_stable_and_unreachable_last():
+    """Ties keep their order, unreachable ones too, and rounding decides nothing."""
+    cost = np.array([2.0, np.inf, 1.0, 2.0 + 1e-15, np.inf, 1.0 - 1e-15])
+    assert stable_order(cost).tolist() == [2, 5, 0, 3, 1, 4]
+
+
+def test_scores_decide_between_equal_costs_only():
+    """A higher score wins a tie of J, never more; unreachable ones ignore it."""
+    cost = np.array([1.0, 1.0, 0.5, np.inf, np.inf, 1.0])
+    scores = np.array([0.1, 0.9, 0.0, 0.1, 0.9, np.nan])
+    assert stable_order(cost, scores).tolist() == [2, 1, 0, 5, 3, 4]
+
+
+def test_likeness_grows_with_both_distances():
+    """φ6 is 0 on a test grasp, ½ one pitch away, ½ one orientation step away."""
+    m = all_reachable()
+    ranker = Ranker(m)
+    pitch = ranker.table.pitch.max()
+    assert pitch == pytest.approx(0.12)
+    assert ranker.table.spacing_rad[0] == pytest.approx(np.radians(30.0))
+    x_axis = m.bin_pose[:3, 0]
+    place, down = m.position[0, 1, 1], np.array([0.0, 0.0, -1.0])
+    tilted = Rotation.from_rotvec(np.radians(10) * x_axis).apply(down)
+    points = np.stack([place, place + 0.03 * x_axis, place])
+    ranking = ranker.rank(points, np.stack([down, down, tilted]), likeness=2.0)
+    expected = [0.0, 2.0 * 0.5 * 0.03 / 0.12, 2.0 * 0.5 * 10 / 30]
+    np.testing.assert_allclose(ranking.terms[:, 3], expected, atol=1e-7)
+    plain = ranker.rank(points, np.stack([down, down, tilted]))
+    np.testing.assert_allclose(ranking.cost - plain.cost, expected, atol=1e-7)
+
+
+def test_likeness_of_full_orientations_uses_their_own_spacing():
+    """With rolls 120° apart the nearest other orientation is a tilt of 30° away."""
+    gaps = [
+        min(
+            rotation_angle(*rotation_from_quaternion_wxyz(np.stack([a, b])))
+            for j, b in enumerate(BIN_MAP.quaternion_wxyz[0, 0, 0])
+            if i != j
+        )
+        for i, a in enumerate(BIN_MAP.quaternion_wxyz[0, 0, 0])
+    ]
+    assert RANKER.table.spacing_rad[1] == pytest.approx(max(gaps))
+
+
+def test_neighbours_are_blended_by_inverse_distance():
+    """The blend of two points is the weighted mean of their own terms."""
+    m = all_reachable()
+    ranker = Ranker(m)
+    a, b = m.position[0, 1, 1], m.position[0, 1, 2]
+    point = 0.75 * a + 0.25 * b
+    down = np.array([[0.0, 0.0, -1.0]])
+    blended = ranker.rank(point[None], down, neighbours=2)
+    terms = [ranker.rank(p[None], down).terms[0, :3] for p in (a, b)]
+    expected = 0.75 * terms[0] + 0.25 * terms[1]
+    np.testing.assert_allclose(blended.terms[0, :3], expected)
+    on_point = ranker.rank(a[None], down, neighbours=5)
+    np.testing.assert_allclose(on_point.terms[0, :3], terms[0], rtol=1e-4)
+
+
+def test_losing_a_neighbour_never_makes_a_grasp_cheaper():
+    """An unreachable neighbour counts with the greatest cost; the nearest decides."""
+    m = all_reachable()
+    found, status = m.path_found.copy(), m.status.copy()
+    found[0, 1, 2], status[0, 1, 2] = 0, Status.NO_IK
+    lost = dataclasses.replace(m, path_found=found, status=status)
+    point = (0.7 * m.position[0, 1, 1] + 0.3 * m.position[0, 1, 2])[None]
+    down = np.array([[0.0, 0.0, -1.0]])
+    before, after = (Ranker(x).rank(point, down, neighbours=4) for x in (m, lost))
+    assert after.cost[0] > before.cost[0]
+    near_lost = (0.3 * m.position[0, 1, 1] + 0.7 * m.position[0, 1, 2])[None]
+    assert not Ranker(lost).rank(near_lost, down, neighbours=4).reachable[0]
+
+
+def test_more_neighbours_than_points():
+    """A map of one point answers for any number of neighbours."""
+    ranker = Ranker(make_bin_map(shape=(1, 1, 1), reachable=1.0))
+    point = ranker.table.points[:1]
+    down = np.array([[0.0, 0.0, -1.0]])
+    one, many = (ranker.rank(point, down, neighbours=k) for k in (1, 64))
+    np.testing.assert_allclose(one.cost, many.cost)
+
+
+def test_outside_the_map_sideways_above_and_below():
+    """Beyond half a grid diagonal and 1 mm, 5 cm off the layer, or the floor."""
+    half = 0.5 * np.hypot(*RANKER.table.pitch)
+    x_edge = BIN_MAP.x[-1]
+    points = {
+        (0.0, 0.0, 0.028): False,
+        (0.0, 0.0, 0.065): False,
+        (0.0, 0.0, 0.0999): False,
+        (0.0, 0.0, 0.1001): True,
+        (0.0, 0.0, 0.0001): False,
+        (0.0, 0.0, -0.0001): True,
+        (x_edge + half, 0.0, 0.05): False,
+        (x_edge + half + 0.0009, 0.0, 0.05): False,
+        (x_edge + half + 0.0011, 0.0, 0.05): True,
+        (2.0, 0.0, 0.05): True,
+    }
+    down = np.tile([0, 0, -1.0], (len(points), 1))
+    ranking = RANKER.rank(in_base(list(points)), down)
+    outside = ranking.status == OUTSIDE_MAP
+    assert outside.tolist() == list(points.values())
+    assert np.isinf(ranking.cost[outside]).all()
+
+
+def test_every_place_in_the_bin_is_inside():
+    """No point over the inner bottom, at the heights of a heap, is outside."""
+    rng = np.random.default_rng(0)
+    size = np.array([0.36, 0.26, 0.0])
+    p = (rng.random((2000, 3)) - 0.5) * size
+    p[:, 2] = rng.uniform(0.028, 0.065, len(p))
+    _, nearest = RANKER._tree.query(in_base(p))
+    assert not outside_map(in_base(p), nearest, RANKER.table).any()
+
+
+def test_layers_extend_the_map_upwards():
+    """With layers at 5 and 9 cm the map reaches from 0 to 14 cm, matched in 3D."""
+    ranker = Ranker(make_bin_map(shape=(2, 3, 3), reachable=1.0, bin_pose=np.eye(4)))
+    z = np.array([0.001, 0.06, 0.08, 0.139, 0.141])
+    points = np.stack([0 * z, 0 * z, z], axis=1)
+    ranking = ranker.rank(points, np.tile([0, 0, -1.0], (5, 1)))
+    assert ranking.test_grasp[:4, 0].tolist() == [0, 0, 1, 1]
+    assert (ranking.status == OUTSIDE_MAP).tolist() == [False] * 4 + [True]
+
+
+def test_a_path_without_a_successful_attempt_has_no_cost():
+    """What only the roadmap proves is not path reachable for a loop that plans."""
+    m = all_reachable()
+    found = m.path_found.copy()
+    found[0, 0, 0] = 0
+    ranker = Ranker(dataclasses.replace(m, path_found=found))
+    ranking = ranker.rank(m.position[0, 0, :2], np.tile([0, 0, -1.0], (2, 1)))
+    assert ranking.status.tolist() == [Status.NO_PATH_FOUND, Status.PATH_FOUND]
+    assert np.isinf(ranking.cost[0])
+
+
+def test_no_grasps():
+    """An empty list has an empty ranking."""
+    ranking = RANKER.rank(np.zeros((0, 3)), np.zeros((0, 3)), neighbours=3)
+    assert ranking.order.shape == (0,)
+    assert ranking.terms.shape == (0, 4)
+
+
+def test_threads_share_a_ranker():
+    """Many threads at once get what one gets."""
+    rng = np.random.default_rng(5)
+    points = in_base(
+        rng.uniform([-0.1, -0.1, 0.03], [0.1, 0.1, 0.07], (8, 200, 3)).reshape(-1, 3)
+    )
+    lists = points.reshape(8, 200, 3)
+    v = rng.normal(size=(8, 200, 3)) * 0.2 - [0, 0, 1]
+    alone = [RANKER.rank(p, d, neighbours=3) for p, d in zip(lists, v, strict=True)]
+    with ThreadPoolExecutor(8) as pool:
+        for _ in range(5):
+            together = pool.map(lambda p, d: RANKER.rank(p, d, neighbours=3), lists, v)
+            for one, other in zip(alone, together, strict=True):
+                np.testing.assert_array_equal(one.order, other.order)
+                np.testing.assert_array_equal(one.cost, other.cost)
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.integers(0, 10**6))
+def test_a_list_ranks_as_its_grasps_do_alone(seed):
+    """Costs do not depend on the other grasps; permuting the list permutes them."""
+    rng = np.random.default_rng(seed)
+    n = 12
+    points = in_base(rng.uniform([-0.2, -0.15, 0.0], [0.2, 0.15, 0.1], (n, 3)))
+    v = rng.normal(size=(n, 3))
+    ranking = RANKER.rank(points, v, likeness=0.3)
+    alone = [RANKER.rank(points[[i]], v[[i]], likeness=0.3).cost[0] for i in range(n)]
+    np.testing.assert_array_equal(ranking.cost, alone)
+    shuffled = rng.permutation(n)
+    again = RANKER.rank(points[shuffled], v[shuffled], likeness=0.3)
+    np.testing.assert_array_equal(again.cost, ranking.cost[shuffled])
+    assert (
+        np.diff(np.round(ranking.cost[ranking.order], 12)[: ranking.reachable.sum()])
+        >= 0
+    ).all()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"points": np.zeros((2, 2))}, r"points must have the shape \('n', 3\)"),
+        ({"points": np.full((2, 3), np.nan)}, "points must be finite"),
+        ({"directions": np.zeros((2, 3))}, "directions must be finite and longer"),
+        ({"directions": np.ones((3, 3))}, r"directions must have the shape \(2, 3\)"),
+        ({"directions": None}, "give directions or rotations"),
+        ({"rotations": np.ones((2, 3, 3))}, "rotations must be orthonormal"),
+        ({"rotations": -np.tile(np.eye(3), (2, 1, 1))}, "determinant"),
+        (
+            {"directions": None, "rotations": np.full((2, 3, 3), np.nan)},
+            "rotations that are NaN need directions",
+        ),
+        ({"weights": (1.0, -1.0, 0.0)}, "weight beta must be between 0"),
+        ({"weights": (1.0, np.nan, 0.0)}, "weight beta must be between 0"),
+        ({"weights": (0.0, 0.0, 0.0)}, "one weight at least"),
+        ({"weights": (1.0, 1.0)}, "three weights are needed"),
+        ({"likeness": np.inf}, "weight likeness"),
+        ({"neighbours": 0}, "neighbours must be 1 to"),
+        ({"roll": "loose"}, "roll must be one of"),
+    ],
+)
+def test_wrong_arguments(arguments, message):
+    """Shapes, numbers and settings that do not fit are named."""
+    given_ = {"points": np.zeros((2, 3)), "directions": np.ones((2, 3)), **arguments}
+    with pytest.raises(SettingsError, match=message):
+        RANKER.rank(**given_)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"position": np.full((1, 3, 3, 3), np.nan)}, "poses that are not finite"),
+        ({"quaternion_wxyz": np.ones((1, 3, 3, 27, 4))}, "not of unit length"),
+        ({"path_length": np.full((1, 3, 3, 27, 5), np.nan)}, "without length or times"),
+    ],
+)
+def test_maps_that_cannot_be_ranked_with(changes, message):
+    """A map whose numbers make no sense is refused when it is loaded."""
+    with pytest.raises(MapFileError, match=message):
+        Ranker(all_reachable(**changes))
+
+
+@pytest.mark.parametrize("tcp_axis", AXES)
+@pytest.mark.parametrize("grasp_axis", AXES)
+def test_orientations_of_another_convention(grasp_axis, tcp_axis):
+    """The TCP approaches along the grasp's axis; what is square to both stays."""
+    R = Rotation.from_rotvec([0.3, -0.5, 0.9]).as_matrix()
+    turned = tcp_rotation(R, grasp_axis, tcp_axis)
+    np.testing.assert_allclose(
+        turned @ axis_vector(tcp_axis), R @ axis_vector(grasp_axis), atol=1e-12
+    )
+    assert np.linalg.det(turned) == pytest.approx(1.0)
+    angle = rotation_angle(R, turned)
+    smallest = direction_angle(axis_vector(tcp_axis), axis_vector(grasp_axis))
+    assert angle == pytest.approx(float(smallest), abs=1e-7)
+
+
+def test_smallest_rotations():
+    """A vector is turned into another by their angle, also if nearly opposite."""
+    rng = np.random.default_rng(2)
+    a = rng.normal(size=(300, 3))
+    b = rng.normal(size=(300, 3))
+    a /= np.linalg.norm(a, axis=1, keepdims=True)
+    b /= np.linalg.norm(b, axis=1, keepdims=True)
+    b[:50] = -a[:50]
+    b[50:100] = a[50:100]
+    b[100:150] = -a[100:150] + 1e-4 * b[100:150]
+    b /= np.linalg.norm(b, axis=1, keepdims=True)
+    R = rotation_between(a, b)
+    np.testing.assert_allclose((R @ a[..., None])[..., 0], b, atol=1e-9)
+    np.testing.assert_allclose(
+        R @ np.swapaxes(R, 1, 2), np.tile(np.eye(3), (300, 1, 1)), atol=1e-9
+    )
+    np.testing.assert_allclose(
+        rotation_angle(R, np.eye(3)), direction_angle(a, b), atol=1e-7
+    )
+
+
+def test_recommended_orientations_can_be_aligned():
+    """The recommended roll with exactly the supplied approach."""
+    v = np.array([[0.1, 0.05, -1.0]]) / np.linalg.norm([0.1, 0.05, -1.0])
+    ranking = RANKER.rank(BIN_MAP.position[0, 2, 2][None], v)
+    R = rotation_from_quaternion_wxyz(ranking.orientation_wxyz)
+    aligned = align(R, v, "+z")
+    np.testing.assert_allclose(aligned[:, :, 2], v, atol=1e-12)
+    np.testing.assert_allclose(rotation_angle(R, aligned), ranking.angle, atol=1e-7)
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.integers(0, 10**6), st.floats(0, np.pi))
+def test_angles_of_quaternions_are_those_of_matrices(seed, angle):
+    """φ2 by quaternions equals φ2 by matrices and the angle that was put in."""
+    a = Rotation.random(random_state=seed)
+    axis = np.random.default_rng(seed).normal(size=3)
+    b = Rotation.from_rotvec(angle * axis / np.linalg.norm(axis)) * a
+    q = [np.roll(r.as_quat(), 1) for r in (a, b)]
+    assert quaternion_angle(q[0], -q[1]) == pytest.approx(angle, abs=1e-7)
+    by_matrix = rotation_angle(a.as_matrix(), b.as_matrix())
+    assert quaternion_angle(*q) == pytest.approx(float(by_matrix), abs=1e-7)
