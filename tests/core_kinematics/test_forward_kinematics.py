@@ -100,7 +100,7 @@ def test_no_configurations_give_no_poses() -> None:
     assert Kinematics(ur5()).forward_many(np.zeros((0, 6))).shape == (0, 4, 4)
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=100, deadline=None)
 @given(
     st.lists(st.floats(-3.0, 3.0), min_size=3, max_size=3),
     st.lists(st.floats(-179.0, 179.0), min_size=3, max_size=3),

@@ -17,7 +17,7 @@ from kinematics_arms import misses, nearest_branch, turns_apart, ur5
 from reachmap._typing import FloatArray
 from reachmap.core.kinematics import Kinematics
 
-COUNT = 80
+COUNT = 50
 
 
 @pytest.fixture(scope="module", name="kinematics")

@@ -5,8 +5,6 @@ Frames: ``base`` (the controller's, a half turn from base_link) to ``tool0``.
 
 from __future__ import annotations
 
-import itertools
-
 import numpy as np
 
 from reachmap._typing import FloatArray
@@ -77,7 +75,7 @@ def wrist_centre_over_base(q: FloatArray, rng: np.random.Generator) -> FloatArra
     There the branch of joint 1 is not determined: ‖p5xy‖ = d4.
     """
     for _ in range(100):
-        grid = np.linspace(-np.pi, np.pi, 41)
+        grid = np.linspace(-np.pi, np.pi, 25)
         values = [_offset(q, q2) for q2 in grid]
         for k in range(len(grid) - 1):
             if values[k] * values[k + 1] < 0:
@@ -94,7 +92,7 @@ def _offset(q: FloatArray, q2: float) -> float:
 
 def _root(q: FloatArray, low: float, high: float) -> float:
     sign = np.sign(_offset(q, low))
-    for _ in itertools.repeat(None, 80):
+    for _ in range(60):
         middle = (low + high) / 2
         if np.sign(_offset(q, middle)) == sign:
             low = middle
