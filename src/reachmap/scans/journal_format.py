@@ -187,6 +187,7 @@ def header_from_line(line: bytes) -> Header:
         raise ValueError("its first line is not a whole journal header")
     try:
         data = json.loads(body)
+        compact(data)  # refuses NaN and infinities, which json.loads does not
     except (ValueError, RecursionError) as error:
         raise ValueError("its header is not JSON") from error
     if not isinstance(data, dict) or data.get("format") != FORMAT:

@@ -1,0 +1,200 @@
+from __future__ import annotations
+
+import json
+
+import pytest
+import toy_work
+from toy_work import Toy, expected
+
+from reachmap.errors import (
+    EngineError,
+    IncompleteError,
+    MapFileError,
+    OutputError,
+    SceneError,
+    SettingsError,
+)
+from reachmap.maps.records import RunInfo, Status
+from reachmap.scans.journal import journal_path
+from reachmap.scans.journal_entries import read_journal
+from reachmap.scans.results import Results, preview
+from reachmap.scans.run import run_scan, run_units
+
+
+@pytest.fixture
+def output(tmp_path):
+    """Where the artefact goes."""
+    return tmp_path / "out.json"
+
+
+def run(output, toy=None, **settings):
+    """Run a toy scan and read the artefact."""
+    outcome = run_scan(toy_work.toy_work(toy), output=output, **settings)
+    return outcome, json.loads(output.read_text())
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_the_artefact_is_what_the_function_says(output, workers):
+    """Journal, workers and order leave no trace in the result; the journal is gone."""
+    outcome, artefact = run(output, workers=workers)
+    assert artefact == expected()
+    assert (outcome.computed, outcome.resumed, outcome.path) == (40, 0, output)
+    assert not journal_path(output).exists()
+    assert isinstance(outcome.run, RunInfo)
+    assert outcome.run.workers == workers
+    assert outcome.run.cpu_s["units"] >= 0
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_a_buggy_unit_is_recorded_and_tried_again(output, workers, caplog):
+    """An exception inside a unit costs that unit; the same command repeats only it."""
+    toy = Toy(buggy=(7, 39))
+    with pytest.raises(IncompleteError, match=r"2 of 40 units failed") as caught:
+        run(output, toy, workers=workers)
+    assert caught.value.lines[1] == "unit 7: ZeroDivisionError: unit 7 divides by zero"
+    assert json.loads(output.read_text()) == expected(failed=(7, 39))
+    with read_journal(journal_path(output)) as entries:
+        assert 'raise ZeroDivisionError(f"unit' in entries.error(39)
+    outcome, artefact = run(output, workers=workers)
+    assert artefact == expected()
+    assert (outcome.computed, outcome.resumed) == (2, 38)
+    assert not journal_path(output).exists()
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_wrong_input_ends_the_run_at_once(output, workers):
+    """A cell that cannot work is one message, not forty failed units."""
+    with pytest.raises(SceneError, match="unit 5 met a cell that cannot work"):
+        run(output, Toy(wrong=(5,)), workers=workers)
+    assert not output.exists()
+    assert run(output, workers=workers)[1] == expected()
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_a_scene_that_cannot_be_built_ends_the_run(output, workers):
+    """Errors of preparing are reported as they are, defects as defects."""
+    with pytest.raises(SceneError, match="scan configuration is in collision"):
+        run(output, Toy(prepare="wrong"), workers=workers)
+    with pytest.raises(EngineError, match="ZeroDivisionError: no scene"):
+        run(output, Toy(prepare="buggy"), workers=workers)
+
+
+def test_workers_that_die_while_preparing_end_the_run(output):
+    """A scene that kills its process is not retried for every unit."""
+    with pytest.raises(EngineError, match="died 5 times before their first unit"):
+        run(output, Toy(prepare="killed"), workers=2)
+
+
+def test_poisoned_and_moody_units(output, tmp_path):
+    """A unit that kills every worker is given up, one that kills one is not."""
+    toy = Toy(poison=(3, 20), moody=(5, 6, 30), marks=str(tmp_path))
+    with pytest.raises(IncompleteError, match="2 of 40 units failed") as caught:
+        run(output, toy, workers=2)
+    assert caught.value.lines[1:] == (
+        "unit 3: killed 3 workers",
+        "unit 20: killed 3 workers",
+    )
+    assert json.loads(output.read_text()) == expected(failed=(3, 20))
+
+
+def test_an_existing_artefact_is_not_replaced_unasked(output):
+    """Without --overwrite an existing output is refused before anything is done."""
+    run(output)
+    before = output.read_bytes()
+    with pytest.raises(OutputError, match="--overwrite"):
+        run(output, Toy(seed=2))
+    assert output.read_bytes() == before
+    assert not journal_path(output).exists()
+    assert run(output, Toy(seed=2), overwrite=True)[1] == expected(seed=2)
+
+
+def test_other_settings_do_not_resume(output):
+    """A journal of another seed is refused by name, and discarded on request."""
+    with pytest.raises(SceneError, match="unit 9"):
+        run(output, Toy(wrong=(9,)))
+    with pytest.raises(MapFileError, match=r"seed 1 → 2.*--restart"):
+        run(output, Toy(seed=2))
+    outcome, artefact = run(output, Toy(seed=2), restart=True)
+    assert artefact == expected(seed=2)
+    assert outcome.resumed == 0
+
+
+def test_other_package_versions_do_not_resume(output, monkeypatch):
+    """Half a map from one planner version and half from the next is no map."""
+    with pytest.raises(SceneError, match="unit 9"):
+        run(output, Toy(wrong=(9,)))
+    monkeypatch.setattr("reachmap.scans.tasks.__version__", "99.0")
+    with pytest.raises(MapFileError, match=r'packages.reachmap "[\d.]+" → "99.0"'):
+        run(output)
+
+
+def test_failing_to_publish_keeps_the_journal(output, monkeypatch):
+    """When the artefact cannot be written, nothing has to be computed again."""
+
+    def full(path, artefact, *, overwrite=False):
+        raise OutputError("No space left on device")
+
+    work = toy_work.toy_work()
+    broken = type(work.kind)(
+        name="toy", blank=toy_work.blank, assemble=toy_work.assemble, write=full
+    )
+    monkeypatch.setattr(toy_work, "KIND", broken)
+    with pytest.raises(OutputError, match="No space left"):
+        run(output)
+    monkeypatch.undo()
+    outcome, artefact = run(output)
+    assert (outcome.computed, outcome.resumed) == (0, 40)
+    assert artefact == expected()
+
+
+def test_an_unknown_executor_is_refused(output):
+    """The message lists what there is; nothing is created."""
+    for name in ("threads", "dask", "dask:", "dask:somewhere", "dask:http://x"):
+        with pytest.raises(SettingsError, match="expected processes, dask:local"):
+            run(output, executor=name)
+    assert not list(output.parent.iterdir())
+
+
+def test_a_preview_shows_what_is_there(output):
+    """A journal under way reads as an artefact with the rest not attempted."""
+    with pytest.raises(SceneError, match="unit 9"):
+        run(output, Toy(wrong=(9,)))
+    rows = preview(journal_path(output))["rows"]
+    assert rows[:9] == expected()["rows"][:9]
+    blank = toy_work.blank({}, 9, Status.NOT_ATTEMPTED)
+    assert rows[9] == toy_work.bits(blank)
+
+
+def test_results_are_a_sequence(output):
+    """Payloads can be indexed, sliced, counted and run through more than once."""
+    with run_units(toy_work.toy_work(), output=output) as results:
+        assert isinstance(results, Results)
+        assert len(results) == results.done == 40
+        assert [one["unit"] for one in results] == list(range(40))
+        assert [one["unit"] for one in results[3:9:2]] == [3, 5, 7]
+        assert (results.missing, dict(results.failed)) == ((), {})
+        with pytest.raises(IndexError, match="unit 40 of 40"):
+            results[40]
+    assert not journal_path(output).exists()
+
+
+def test_a_payload_of_another_kind_is_an_error_of_the_file(output):
+    """A journal with the right sums and the wrong contents is not believed."""
+    work = toy_work.toy_work()
+    with pytest.raises(RuntimeError, match="stop"), run_units(work, output=output):
+        raise RuntimeError("stop")
+
+    def refuse(data):
+        raise KeyError("status")
+
+    strict = type(work.kind)(
+        name="toy",
+        blank=toy_work.blank,
+        assemble=toy_work.assemble,
+        write=toy_work.write,
+        decode=refuse,
+    )
+    with read_journal(journal_path(output)) as entries:
+        results = Results(strict, [entries])
+        with pytest.raises(MapFileError, match="unit 0 of the journal is not a result"):
+            results[0]
