@@ -35,6 +35,8 @@ from typing import Any, TypeVar
 
 import click
 
+from reachmap.cli.failures import RunState
+
 Decorated = TypeVar("Decorated", bound=Callable[..., Any])
 Decorator = Callable[[Decorated], Decorated]
 
@@ -101,6 +103,7 @@ set_option = _option(
 seed_option = _option(
     "--seed",
     type=click.IntRange(min=0),
+    metavar="N",
     help="Seed of everything random; by default the cell's.",
 )
 
@@ -108,6 +111,7 @@ workers_option = _option(
     "-j",
     "--workers",
     type=click.IntRange(min=1),
+    metavar="N",
     default=available_cores,
     show_default="all cores",
     help="Worker processes; 1 works in this process.",
@@ -141,10 +145,18 @@ dry_run_option = _option(
     help="Say what would be done, and how long it would take; write nothing.",
 )
 
+
+def _unless_quiet(ctx: click.Context, parameter: click.Parameter, value: bool) -> bool:
+    state = ctx.find_object(RunState)
+    return value and not (state is not None and state.verbosity < 0)
+
+
 progress_option = _option(
     "--progress/--no-progress",
     default=True,
-    help="Report progress on stderr: a bar on a terminal, else a line now and then.",
+    callback=_unless_quiet,
+    help="Report progress on stderr: a bar on a terminal, else a line now and then. "
+    "-q silences it, too.",
 )
 
 overwrite_option = _option(

@@ -10,6 +10,8 @@ import pytest
 from click.testing import CliRunner
 
 from reachmap.cli import options
+from reachmap.cli.failures import RunState
+from reachmap.cli.verbosity import verbosity_parameters
 
 
 def run(command: click.Command, *arguments: str, **env: str) -> str:
@@ -89,3 +91,26 @@ def test_the_inventory_lists_every_shared_option() -> None:
             command = click.command()(value(lambda **_: None))
             for flag in (flag for option in command.params for flag in option.opts):
                 assert f"``{flag}``" in options.__doc__, flag
+
+
+@pytest.mark.parametrize(
+    ("arguments", "answer"),
+    [
+        ([], "True"),
+        (["--no-progress"], "False"),
+        (["-q"], "False"),
+        (["--progress", "-q"], "False"),
+        (["-q", "-v"], "True"),
+    ],
+)
+def test_quiet_silences_progress(arguments: list[str], answer: str) -> None:
+    """-q after the command's name counts, wherever it stands."""
+
+    @click.command(params=verbosity_parameters())
+    @options.progress_option
+    def scan(progress: bool) -> None:
+        """Scan."""
+        click.echo(progress)
+
+    result = CliRunner().invoke(scan, arguments, obj=RunState())
+    assert result.output.strip() == answer
