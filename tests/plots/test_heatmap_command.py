@@ -27,12 +27,6 @@ from reachmap.maps import (
 PNG = b"\x89PNG\r\n\x1a\n"
 
 
-@pytest.fixture(autouse=True)
-def _coarse_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Rendering at full resolution is most of the time, and nothing here looks."""
-    monkeypatch.setattr("reachmap.plots.style.DPI", 30)
-
-
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A current folder with a workspace map of two levels, 3 × 4 points each."""
@@ -40,6 +34,15 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     shares = np.arange(24).reshape(2, 3, 4) / 24.0
     write_workspace_map(tmp_path / "workspace.h5", synthetic_workspace_map(shares))
     return tmp_path
+
+
+@pytest.fixture
+def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Leave the drawing out where only files and names matter."""
+    monkeypatch.setattr("reachmap.plots.files.figure_bytes", lambda *a, **k: PNG)
+    for name in ("level", "overview", "reachability", "costs", "approach",
+                 "saturation", "placement"):  # fmt: skip
+        monkeypatch.setattr(f"reachmap.plots.albums.draw_{name}", lambda *a, **k: None)
 
 
 def run(*arguments: str) -> Result:
@@ -68,6 +71,7 @@ def test_default_is_the_path_map_of_the_current_folder(folder: Path) -> None:
     )
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_existing_pictures_are_kept_unless_told_otherwise(folder: Path) -> None:
     """Exit code 2 and nothing touched, not even the pictures that were missing."""
     (folder / "heatmaps").mkdir()
@@ -99,6 +103,7 @@ def test_one_level_of_one_quantity(folder: Path) -> None:
     assert text.startswith("<?xml")
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_all_quantities(folder: Path) -> None:
     """Four quantities, each with two levels and an overview."""
     written = names(run("--quantity", "all", "--level", "0"))
@@ -118,6 +123,7 @@ def test_unknown_level_lists_the_levels(folder: Path) -> None:
     assert not (folder / "heatmaps").exists()
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_tables_hold_the_numbers_of_the_map(folder: Path) -> None:
     """A CSV per level, the largest y first, as the picture shows it."""
     written = names(run("--level", "0.1", "--csv"))
@@ -133,6 +139,7 @@ def test_tables_hold_the_numbers_of_the_map(folder: Path) -> None:
     )
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_bin_map_gives_the_pictures_of_a_bin(folder: Path) -> None:
     """Reachability, costs, approach directions, saturation; layers are named."""
     write_bin_map(folder / "bin.h5", synthetic_bin_map(shape=(1, 2, 3, 4, 2)))
@@ -145,6 +152,7 @@ def test_bin_map_gives_the_pictures_of_a_bin(folder: Path) -> None:
     assert (folder / "two" / "bin_reachability_layer+0.10.csv").is_file()
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_placement_is_drawn_on_the_map_it_was_made_from(folder: Path) -> None:
     """Another map beside it is not used in silence."""
     source = read_workspace_map(folder / "workspace.h5").stamp.content_sha256

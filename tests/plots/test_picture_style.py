@@ -123,7 +123,7 @@ def test_drawing_needs_neither_pyplot_nor_a_display() -> None:
         items = workspace_album(synthetic_workspace_map(np.eye(3)[None]), ["path"])
         items += bin_album(synthetic_bin_map(shape=(1, 2, 2, 4, 2)))
         for item in items:
-            item.draw().draw_without_rendering()
+            item.draw()
         assert figure_bytes(items[0].draw(), "png", title="", config_sha256="")
         assert "matplotlib.pyplot" not in sys.modules
         """

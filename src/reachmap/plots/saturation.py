@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from reachmap._typing import FloatArray, IntArray
 from reachmap.maps.records import BinMap
@@ -37,7 +37,7 @@ def wilson_interval(
     >>> float(low), round(float(high), 4)
     (0.0, 0.2775)
     """
-    z2 = float(norm.ppf(0.5 + confidence / 2.0)) ** 2
+    z2 = float(ndtri(0.5 + confidence / 2.0)) ** 2
     share = hits / total
     middle = (share + z2 / (2.0 * total)) / (1.0 + z2 / total)
     spread = share * (1.0 - share) / total + z2 / (4.0 * total**2)

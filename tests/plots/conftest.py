@@ -1,0 +1,10 @@
+"""Pictures in these tests are rendered coarsely: pixels are most of the time."""
+
+from __future__ import annotations
+
+import pytest
+
+
+@pytest.fixture(autouse=True)
+def _coarse_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("reachmap.plots.style.DPI", 50)
