@@ -10,6 +10,7 @@ from typing import Any, Final
 from reachmap.errors import GraspListError, SettingsError
 from reachmap.ranking.grasp_arrays import GraspList, arrays_from_document
 from reachmap.ranking.grasp_document import FORMAT, check_document
+from reachmap.ranking.grasp_fields import shown
 from reachmap.ranking.importers import FORMATS, NATIVE, document_from_bytes
 from reachmap.ranking.json_text import JsonPath, dotted, limited, lines_of
 
@@ -107,12 +108,17 @@ def _read_bytes(path: str | Path, source: str) -> bytes:
 def _refuse_overrides(
     document: Any, frame: str | None, approach_axis: str | None, source: str
 ) -> None:
+    # What is no such document, or lacks its frame, is reported when it is checked.
     own = document if isinstance(document, dict) else {}
-    for name, value in (("frame", frame), ("approach_axis", approach_axis)):
-        if value is not None and own.get(name) != value:
+    stated = (
+        ("frame", own.get("frame", frame), frame),
+        ("approach_axis", own.get("approach_axis", "+z"), approach_axis),
+    )
+    for name, value, wanted in stated:
+        if wanted is not None and value != wanted:
             raise SettingsError(
                 f"{source}: a {FORMAT} document states its own {name} "
-                f"({own.get(name)!r}); {value!r} is for imported lists"
+                f"({shown(value)}); {wanted} is for imported lists"
             )
 
 

@@ -18,6 +18,7 @@ UNIT_TOLERANCE: Final = 1e-2
 MAX_NPZ_BYTES: Final = 64 * 2**20
 GRASPNET_COLUMNS: Final = 17
 SUCTION_COLUMNS: Final = 7
+MAX_VALUE: Final = 1e9
 _NPY_START: Final = re.compile(rb"\x93NUMPY(?P<version>[\x01\x02])\x00", re.DOTALL)
 _NUMBERS: Final = re.compile(r"[<>|](f[48]|[iu][1248])")
 
@@ -96,10 +97,12 @@ def _checked(rows: FloatArray, source: str) -> FloatArray:
             f"{source}: expected {GRASPNET_COLUMNS} columns (GraspNet) or "
             f"{SUCTION_COLUMNS} (suction); the array has the shape {rows.shape}"
         )
-    bad = np.flatnonzero(~np.isfinite(rows).all(axis=1))
+    # The comparison is false for NaN as well.
+    bad = np.flatnonzero(~(np.abs(rows) < MAX_VALUE).all(axis=1))
     if bad.size:
         raise GraspListError(
-            f"{source}: {bad.size} rows hold NaN or infinity; the first is row {bad[0]}"
+            f"{source}: {bad.size} rows hold NaN, infinity or numbers beyond "
+            f"{MAX_VALUE:g}; the first is row {bad[0]}"
         )
     return rows
 
