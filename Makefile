@@ -16,7 +16,7 @@ BIN      := $(VENV)/bin
 PIP      := $(BIN)/python -m pip --disable-pip-version-check -qq
 REACHMAP := $(BIN)/reachmap
 SCAN     := -j $(WORKERS) --overwrite
-RESULTS  := $(RUN)/.heatmaps $(RUN)/ranked.json $(RUN)/report.html
+RESULTS  := $(RUN)/.pictures $(RUN)/ranked.json $(RUN)/report.html
 
 .DEFAULT_GOAL := run
 .DELETE_ON_ERROR:
@@ -27,7 +27,7 @@ help: ## Show this list
 	@awk 'BEGIN {FS = ":.*## "} /^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
 
 run: $(RESULTS) ## Install, then scan, place, scan and rank on the shipped cell (default)
-	@echo "Done: heat maps, placement, bin map, $(RUN)/ranked.json and $(RUN)/report.html."
+	@echo "Done. Open $(RUN)/report.html, $(RUN)/pictures and $(RUN)/ranked.json."
 
 paper: ## The same at the full sizes of the paper, into run/paper
 	@$(MAKE) --no-print-directory run RUN=run/paper SIZE=
@@ -99,18 +99,20 @@ $(RUN)/workspace.h5: $(wildcard cells/$(CELL).yaml $(CELL)) | $(VENV)/.runtime
 	@mkdir -p $(RUN)
 	$(REACHMAP) workspace-scan $(CELL) $(SIZE) $(SCAN) -o $@
 
-$(RUN)/.heatmaps: $(RUN)/workspace.h5
-	$(REACHMAP) heatmap $< -o $(RUN)/heatmaps --overwrite
-	@touch $@
-
 $(RUN)/placement.h5: $(RUN)/workspace.h5
 	$(REACHMAP) place-bin $< -o $@ --overwrite
 
 $(RUN)/bin.h5: $(RUN)/placement.h5
 	$(REACHMAP) bin-scan $< $(SCAN) -o $@
 
+$(RUN)/.pictures: $(RUN)/workspace.h5 $(RUN)/placement.h5 $(RUN)/bin.h5
+	$(REACHMAP) heatmap $(RUN)/workspace.h5 -o $(RUN)/pictures --overwrite
+	$(REACHMAP) heatmap $(RUN)/placement.h5 -o $(RUN)/pictures --overwrite
+	$(REACHMAP) heatmap $(RUN)/bin.h5 -o $(RUN)/pictures --overwrite
+	@touch $@
+
 $(RUN)/ranked.json: $(RUN)/bin.h5 $(GRASPS)
 	$(REACHMAP) rank $(GRASPS) --map $< --chart $(RUN)/ranking.png -o $@ --overwrite
 
-$(RUN)/report.html: $(RUN)/ranked.json $(RUN)/.heatmaps
+$(RUN)/report.html: $(RUN)/ranked.json $(RUN)/.pictures
 	$(REACHMAP) report $(RUN) -o $@ --overwrite
