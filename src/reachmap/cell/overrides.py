@@ -46,7 +46,7 @@ def _apply(document: Document, text: str, place: Place, model: type[BaseModel]) 
     path, separator, value_text = text.partition("=")
     if not separator or not path.strip():
         raise _PathError("expected key.path=value")
-    value = parse_yaml(value_text, str(place))
+    value = parse_yaml(value_text.strip() or "null", str(place))
     parts = [part.strip() for part in path.strip().split(".")]
     container, location = document.data, ()  # type: tuple[Any, Location]
     for index, part in enumerate(parts):

@@ -6,6 +6,7 @@ mesh is reported together with a misspelt key.
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Collection
 from typing import Any
 
@@ -49,10 +50,16 @@ def check_names(
     _check_touch(document, robot)
     _check_srdf_names(document, srdf)
     moving: tuple[str, ...] | None = moving_joints(document.data, robot, srdf)
-    if not moving and document.mistakes:
-        moving = None  # a consequence of a mistake that is already listed
+    unsure = any(m.location[:1] == ("robot",) for m in document.mistakes)
+    if not moving and not unsure:
+        location = ("robot", "tcp", "parent")
+        document.add(location, "no joint moves between the base and the TCP")
+    if not moving:
+        moving = None
     _check_joints(document, robot, moving)
-    if moving is not None:
+    given = entries(document.data, "robot", "joints")
+    # Otherwise what follows from a wrong chain would bury the cause.
+    if moving is not None and len(moving) >= len(given):
         _check_scan_configuration(document, moving)
 
 
@@ -162,10 +169,6 @@ def _check_joints(
             ("robot", "ik", "redundant_joint"),
             f"{redundant!r} is not a joint that moves; {hint}",
         )
-    if not moving and not entries(data, "robot", "joints"):
-        document.add(
-            ("robot", "tcp", "parent"), "no joint moves between the base and the TCP"
-        )
 
 
 def _check_srdf_names(document: Document, srdf: SrdfDescription | None) -> None:
@@ -197,6 +200,11 @@ def _check_scan_configuration(document: Document, moving: tuple[str, ...]) -> No
                 document.add(
                     (*location, name), f"not a joint that moves; {hint}", of_key=True
                 )
-        missing = [name for name in moving if name not in table]
+        unknown = [name for name in table if name not in moving]
+        missing = [
+            name
+            for name in moving
+            if name not in table and not difflib.get_close_matches(name, unknown)
+        ]
         if missing:
             document.add(location, f"joints are missing: {', '.join(missing)}")

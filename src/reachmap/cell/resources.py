@@ -165,13 +165,14 @@ def _normal(path: Path) -> Path:
 
 def _existing(reference: str, candidates: list[Path]) -> Path:
     """First candidate that is a file."""
-    for path in candidates:
+    paths = [_normal(path) for path in candidates]
+    for path in paths:
         try:
             if path.is_file():
-                return _normal(path)
+                return path
         except (OSError, ValueError):
             break
-    places = ", ".join(str(_normal(path)) for path in candidates)
+    places = ", ".join(str(path) for path in paths)[:4000]
     shown = reference if len(reference) <= 200 else reference[:197] + "…"
     if "\0" in places:
         raise NotFoundError(f"{shown!r}: not a file name")

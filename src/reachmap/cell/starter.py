@@ -138,8 +138,8 @@ def _robot(c: StarterChoices) -> str:
     if c.base != c.root:
         lines.append(f"  base_frame: {scalar(c.base)}")
     lines += [
-        "  # GUESS: the link that carries the tool, the tool centre point in its frame,",
-        "  # and the axis of the tool centre point that points into the object.",
+        "  # GUESS: the link that carries the tool, the tool centre point in its",
+        "  # frame, and the axis of it that points into the object.",
         f"  tcp: {{parent: {scalar(c.tip)}, xyz: [0, 0, 0], "
         f'approach_axis: "{approach_axis(c.tip)}"}}',
     ]

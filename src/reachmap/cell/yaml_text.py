@@ -31,7 +31,7 @@ from reachmap.errors import CellError
 
 MAX_TEXT_BYTES = 256_000
 MAX_DEPTH = 24
-MAX_VALUES = 50_000
+MAX_VALUES = 20_000
 
 Location = tuple[str | int, ...]
 
@@ -171,6 +171,8 @@ def parse_yaml(text: str, source: str) -> Document:
     document = Document(source=source)
     try:
         _Builder(document).build(YAML(typ="safe", pure=True).parse(text))
+    except CellError:
+        raise  # a ValueError too, which the last clause would wrap
     except MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         place = Place(source=source)
