@@ -19,6 +19,7 @@ from reachmap.ranking.matching import (
     Queries,
     match_at,
     nearest_points,
+    worth_of,
 )
 from reachmap.ranking.table import GraspTable
 
@@ -111,14 +112,13 @@ def blended_terms(
     distance, point = _in_order(queries.points, tree, neighbours + 1)
     weight = 1.0 / np.maximum(matches.distance, MIN_DISTANCE_M)
     total, blend = weight.copy(), phi * weight[:, None]
+    worth = worth_of(table_cost)
     # The matched point is one of the nearest; the others follow by distance.
     used = np.zeros(len(queries), np.int64)
     for column in range(point.shape[1]):
         other = (point[:, column] != matches.point) & (used < neighbours - 1)
         used += other
-        near = match_at(
-            queries, table, point[:, column], distance[:, column], table_cost
-        )
+        near = match_at(queries, table, point[:, column], distance[:, column], worth)
         terms = table.normalised[near.point, near.orientation]
         terms = np.where(np.isnan(terms), 1.0, terms)
         weight = np.where(other, 1.0 / np.maximum(near.distance, MIN_DISTANCE_M), 0.0)

@@ -168,13 +168,7 @@ def _tie_lines(
     ranked: RankedList, row: int, ranker: Ranker, bin_map: BinMap
 ) -> list[str]:
     """Return the test grasps that were as near: the rolls of one approach, mostly."""
-    one, queries = slice(row, row + 1), ranked.queries
-    query = Queries(
-        points=queries.points[one],
-        axes=queries.axes[one],
-        quaternions=queries.quaternions[one],
-        free=queries.free[one],
-    )
+    query = ranked.queries.take(np.array([row]))
     point, orientation = ranker.tied(query)
     if len(point) < 2:
         return []

@@ -47,6 +47,15 @@ class Queries:
     def __len__(self) -> int:
         return len(self.points)
 
+    def take(self, rows: IntArray) -> Queries:
+        """Return some of the grasps."""
+        return Queries(
+            points=self.points[rows],
+            axes=self.axes[rows],
+            quaternions=self.quaternions[rows],
+            free=self.free[rows],
+        )
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Matches:
@@ -86,14 +95,24 @@ def match(
     cost : array, shape (points, orientations)
         J of each test grasp, inf where unreachable; decides ties.
     """
+    worth = worth_of(cost)
     distance, point = nearest_points(queries.points, tree, 2)
-    matches = match_at(queries, table, point[:, 0], distance[:, 0], cost)
+    matches = match_at(queries, table, point[:, 0], distance[:, 0], worth)
     if distance.shape[1] > 1:
         # Few grasps lie midway between points; only they are looked at again.
         midway = np.flatnonzero(distance[:, 1] - distance[:, 0] <= TIE_M)
         if midway.size:
-            _rematch(matches, midway, queries, table, tree, cost)
+            _rematch(matches, midway, queries, table, tree, worth)
     return matches
+
+
+def worth_of(cost: FloatArray) -> FloatArray:
+    """Costs as ties compare them: to twelve decimals, and never infinite.
+
+    Rounded, costs that differ in the last digit count as equal. Below infinity, an
+    unreachable test grasp that ties still wins over one that does not tie.
+    """
+    return np.minimum(np.round(cost, 12), 1e300)
 
 
 def nearest_points(
@@ -113,7 +132,7 @@ def match_at(
     table: GraspTable,
     point: IntArray,
     distance: FloatArray,
-    cost: FloatArray,
+    worth: FloatArray,
 ) -> Matches:
     """Match each grasp among the orientations of a given test point.
 
@@ -124,15 +143,18 @@ def match_at(
     point : int array, shape (n,)
     distance : array, shape (n,)
         φ1 to that point [m].
-    cost : array, shape (points, orientations)
+    worth : array, shape (points, orientations)
+        Costs from :func:`worth_of`.
     """
-    angles = _angles(queries, table, np.arange(len(queries)), point)
-    orientation, angle = _least(angles, cost[point])
+    cosines = _cosines(queries, table, point)
+    first = np.argmax(cosines, axis=1)
+    near = cosines >= _tie_limit(queries, table, point, first)[:, None]
+    orientation = np.argmin(np.where(near, worth[point], np.inf), axis=1)
     return Matches(
         point=point.copy(),
         orientation=orientation,
         distance=distance.copy(),
-        angle=angle,
+        angle=_angles(queries, table, point, orientation),
     )
 
 
@@ -148,8 +170,8 @@ def tied(query: Queries, table: GraspTable, tree: cKDTree) -> tuple[IntArray, In
     -------
     point, orientation : int array, shape (t,)
     """
-    _, point, angles = _candidates(query, np.array([0]), table, tree)
-    column, orientation = np.nonzero(angles[0] <= angles.min() + TIE_RAD)
+    _, point, near = _tied_points(query, table, tree)
+    column, orientation = np.nonzero(near[0])
     return point[0, column], orientation
 
 
@@ -159,58 +181,81 @@ def _rematch(
     queries: Queries,
     table: GraspTable,
     tree: cKDTree,
-    cost: FloatArray,
+    worth: FloatArray,
 ) -> None:
     """Match rows again over all points that tie in φ1."""
-    distance, point, angles = _candidates(queries, rows, table, tree)
-    flat = angles.reshape(len(rows), -1)
-    best, angle = _least(flat, cost[point].reshape(len(rows), -1))
-    column, orientation = np.divmod(best, angles.shape[2])
+    part = queries.take(rows)
+    distance, point, near = _tied_points(part, table, tree)
+    flat = np.where(near, worth[point], np.inf).reshape(len(rows), -1)
+    column, orientation = np.divmod(np.argmin(flat, axis=1), near.shape[2])
     every = np.arange(len(rows))
     matches.point[rows] = point[every, column]
     matches.orientation[rows] = orientation
     matches.distance[rows] = distance[every, column]
-    matches.angle[rows] = angle
+    matches.angle[rows] = _angles(part, table, point[every, column], orientation)
 
 
-def _candidates(
-    queries: Queries, rows: IntArray, table: GraspTable, tree: cKDTree
-) -> tuple[FloatArray, IntArray, FloatArray]:
-    """Nearest points of some grasps, with angles: inf at points that do not tie."""
-    distance, point = nearest_points(queries.points[rows], tree, TIED_POINTS)
+def _tied_points(
+    queries: Queries, table: GraspTable, tree: cKDTree
+) -> tuple[FloatArray, IntArray, BoolArray]:
+    """Nearest points (n, k), and which of their orientations tie (n, k, m)."""
+    distance, point = nearest_points(queries.points, tree, TIED_POINTS)
     # In map order, so that "the first" means the same on every machine.
     order = np.argsort(point, axis=1)
     point = np.take_along_axis(point, order, axis=1)
     distance = np.take_along_axis(distance, order, axis=1)
-    count = point.shape[1]
-    repeated = np.repeat(rows, count)
-    angles = _angles(queries, table, repeated, point.ravel())
-    angles = angles.reshape(len(rows), count, -1)
-    near = distance <= distance.min(axis=1, keepdims=True) + TIE_M
-    return distance, point, np.where(near[..., None], angles, np.inf)
+    n, k = point.shape
+    repeated = queries.take(np.repeat(np.arange(n), k))
+    cosines = _cosines(repeated, table, point.ravel()).reshape(n, k, -1)
+    close = distance <= distance.min(axis=1, keepdims=True) + TIE_M
+    cosines = np.where(close[..., None], cosines, -np.inf)
+    flat = np.argmax(cosines.reshape(n, -1), axis=1)
+    column, first = np.divmod(flat, cosines.shape[2])
+    limit = _tie_limit(queries, table, point[np.arange(n), column], first)
+    return distance, point, cosines >= limit[:, None, None]
+
+
+def _cosines(queries: Queries, table: GraspTable, point: IntArray) -> FloatArray:
+    """Cosine of φ2 where the roll is free, else of φ2 / 2; shape (n, m).
+
+    Both fall as φ2 grows, and cost no inverse function for every test grasp. Their
+    rounding hides angles below about 1e-8, a hundredth of what counts as a tie.
+    """
+    free = queries.free
+    if free.all():
+        return _products(queries.axes, table.axes, point, table)
+    if not free.any():
+        return np.abs(_products(queries.quaternions, table.quaternions, point, table))
+    cosines = np.empty((len(queries), table.axes.shape[1]))
+    for rows in (np.flatnonzero(free), np.flatnonzero(~free)):
+        cosines[rows] = _cosines(queries.take(rows), table, point[rows])
+    return cosines
+
+
+def _products(
+    vectors: FloatArray, stored: FloatArray, point: IntArray, table: GraspTable
+) -> FloatArray:
+    """Scalar products with every orientation of one point each, shape (n, m)."""
+    if table.same_everywhere:
+        return np.asarray(vectors @ stored[0].T)
+    return np.asarray(np.einsum("nk,nmk->nm", vectors, stored[point]))
+
+
+def _tie_limit(
+    queries: Queries, table: GraspTable, point: IntArray, orientation: IntArray
+) -> FloatArray:
+    """Least cosine that ties with a given, nearest orientation; shape (n,)."""
+    limit = _angles(queries, table, point, orientation) + TIE_RAD
+    limit = np.minimum(limit, np.pi)
+    return np.cos(np.where(queries.free, limit, 0.5 * limit)) - 1e-15
 
 
 def _angles(
-    queries: Queries, table: GraspTable, rows: IntArray, point: IntArray
+    queries: Queries, table: GraspTable, point: IntArray, orientation: IntArray
 ) -> FloatArray:
-    """φ2 from grasps to every orientation of one point each, shape (n, m)."""
-    free = queries.free[rows]
-    if free.all():
-        return direction_angle(queries.axes[rows][:, None], table.axes[point])
-    if not free.any():
-        quaternions = queries.quaternions[rows][:, None]
-        return quaternion_angle(quaternions, table.quaternions[point])
-    angles = np.empty((len(rows), table.axes.shape[1]))
-    for part in (free, ~free):
-        angles[part] = _angles(queries, table, rows[part], point[part])
-    return angles
-
-
-def _least(angles: FloatArray, cost: FloatArray) -> tuple[IntArray, FloatArray]:
-    """Column of the least angle in each row; ties go to the least cost, then first."""
-    near = angles <= angles.min(axis=1, keepdims=True) + TIE_RAD
-    # Rounded, so that costs equal but for the last digit count as equal; an
-    # unreachable test grasp that ties still wins over one that does not tie.
-    worth = np.where(near, np.minimum(np.round(cost, 12), 1e300), np.inf)
-    best = np.argmin(worth, axis=1)
-    return best, angles[np.arange(len(angles)), best]
+    """φ2 to one orientation each, to full precision; shape (n,)."""
+    axes = direction_angle(queries.axes, table.axes[point, orientation])
+    if queries.free.all():
+        return axes
+    turns = quaternion_angle(queries.quaternions, table.quaternions[point, orientation])
+    return np.where(queries.free, axes, turns)

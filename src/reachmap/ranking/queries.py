@@ -49,7 +49,8 @@ def queries_from_arrays(
     R = np.full((n, 3, 3), np.nan) if rotations is None else rotations
     R = _array(R, "rotations", (3, 3), n, finite=False)
     known: BoolArray = np.all(np.isfinite(R), axis=(1, 2))
-    _check_rotations(R[known])
+    if known.any():
+        _check_rotations(R[known])
     axes = R @ axis_vector(table.approach_axis)
     if not known.all():
         if directions is None:
@@ -85,7 +86,8 @@ def _array(
 
 def _check_rotations(R: FloatArray) -> None:
     skew = np.abs(np.swapaxes(R, 1, 2) @ R - np.eye(3)).max(initial=0.0)
-    if skew > 1e-2 or (np.linalg.det(R) < 0).any():
+    handed = np.sum(np.cross(R[:, :, 0], R[:, :, 1]) * R[:, :, 2], axis=1)
+    if skew > 1e-2 or (handed < 0).any():
         raise SettingsError("rotations must be orthonormal with determinant +1")
 
 

@@ -48,6 +48,8 @@ class GraspTable:
         Greatest of each mean over the path-reachable test grasps.
     normalised : array, shape (n, m, 3)
         φ3, φ4, φ5 in [0, 1]; NaN where unreachable.
+    same_everywhere : bool
+        Whether every point has the same orientations, as families give them.
     layers : array, shape (nl,)
         Heights in the bin frame [m].
     bin_points : array, shape (n, 3)
@@ -71,6 +73,7 @@ class GraspTable:
     means: FloatArray
     maxima: FloatArray
     normalised: FloatArray
+    same_everywhere: bool
     layers: FloatArray
     bin_points: FloatArray
     pitch: FloatArray
@@ -122,6 +125,9 @@ def table_from_bin_map(bin_map: BinMap) -> GraspTable:
         maxima=maxima,
         # A term that is zero everywhere costs nothing rather than 0/0.
         normalised=means / np.where(maxima > 0, maxima, 1.0),
+        same_everywhere=bool(
+            (quaternion_angle(quaternions, quaternions[0]) < 1e-9).all()
+        ),
         layers=bin_map.layer.copy(),
         bin_points=points @ T_bin_base[:3, :3].T + T_bin_base[:3, 3],
         pitch=_pitch(bin_map),
