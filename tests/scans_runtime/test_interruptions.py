@@ -76,12 +76,32 @@ def workers_of(process):
     ]
 
 
+def wait_a_while(output, process, rng):
+    """Wait for a random time, or for a random number of further units."""
+    if rng.random() < 0.5:
+        time.sleep(rng.uniform(0.05, 1.5))
+        return
+    more, deadline = rng.randrange(1, 20), time.monotonic() + 60
+    before = size(output)
+    while process.poll() is None and size(output) < before + more * 300:
+        assert time.monotonic() < deadline
+        time.sleep(0.005)
+
+
+def size(output):
+    """Length of the journal; a toy's line has about 300 bytes."""
+    try:
+        return journal_path(output).stat().st_size
+    except FileNotFoundError:
+        return 0
+
+
 def kill_at_random_moments(output, count, seed):
     """SIGKILL a scan up to `count` times, resume it, and return how often it died."""
     rng, deaths = random.Random(seed), 0
     while deaths < count and not output.exists():
         process = start(output, "-j", "2", units=60, pause_s=0.02)
-        time.sleep(rng.uniform(0.05, 1.5))
+        wait_a_while(output, process, rng)
         children = psutil.Process(process.pid).children()
         process.kill()
         process.communicate()
@@ -109,11 +129,11 @@ def test_killed_at_random_moments_and_resumed(tmp_path, count):
 @pytest.mark.parametrize(
     ("number", "workers"),
     [
-        (signal.SIGINT, "1"),
-        (signal.SIGTERM, "1"),
         (signal.SIGINT, "2"),
-        (signal.SIGTERM, "2"),
-        (signal.SIGHUP, "2"),
+        (signal.SIGTERM, "1"),
+        pytest.param(signal.SIGINT, "1", marks=pytest.mark.slow),
+        pytest.param(signal.SIGTERM, "2", marks=pytest.mark.slow),
+        pytest.param(signal.SIGHUP, "2", marks=pytest.mark.slow),
     ],
 )
 def test_told_to_stop(tmp_path, number, workers):
@@ -145,7 +165,7 @@ def test_a_worker_killed_again_and_again(tmp_path):
     process = start(output, "-j", "2", units=40, pause_s=0.1)
     wait_for_units(output, 1, process)
     rng, killed = random.Random(7), 0
-    while process.poll() is None and killed < 6:
+    while process.poll() is None and killed < 4:
         if workers := workers_of(process):
             rng.choice(workers).kill()
             killed += 1
@@ -164,7 +184,7 @@ def test_no_room_left(tmp_path):
     def limit():
         resource.setrlimit(resource.RLIMIT_FSIZE, (6000, 6000))
 
-    process = start(output, "-j", "2", limit=limit)
+    process = start(output, "-j", "1", limit=limit)
     _, err = process.communicate(timeout=60)
     assert process.returncode == 3
     last = err.strip().splitlines()[-1]
@@ -175,7 +195,7 @@ def test_no_room_left(tmp_path):
         kept = len(entries.results)
         assert (kept > 0, entries.damaged) == (True, 0)
     assert journal_path(output).stat().st_size <= 6000
-    code, counts, err = finish(output, "-j", "2")
+    code, counts, err = finish(output, "-j", "1")
     assert (code, counts) == (0, [str(40 - kept), str(kept)]), err
     assert json.loads(output.read_text()) == expected()
 
@@ -183,12 +203,12 @@ def test_no_room_left(tmp_path):
 def test_a_second_run_on_one_output_is_refused(tmp_path):
     """Only one run writes; the other says so with exit code 2 and disturbs nothing."""
     output = tmp_path / "out.json"
-    first = start(output, "-j", "2", pause_s=600.0)
+    first = start(output, "-j", "1", pause_s=600.0)
     wait_for_units(output, 0, first)
-    code, _, err = finish(output, "-j", "2")
+    code, _, err = finish(output, "-j", "1")
     assert code == 2
     assert "is being written by another run" in err
     first.send_signal(signal.SIGINT)
     first.communicate(timeout=60)
-    assert finish(output, "-j", "2")[0] == 0
+    assert finish(output, "-j", "1")[0] == 0
     assert json.loads(output.read_text()) == expected()

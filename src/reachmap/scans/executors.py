@@ -36,6 +36,8 @@ WINDOW_AGE_S = 5.0
 WAIT_FOR_WORKERS_S = 300.0
 SCHEMES = ("tcp://", "tls://", "ws://", "wss://")
 
+log = logging.getLogger(__name__)
+
 
 @contextmanager
 def open_lanes(name: str, workers: int, parcel: Parcel) -> Iterator[list[LaneSpec]]:
@@ -110,6 +112,7 @@ def lane_of(make: Callable[[], Executor], parcel: Parcel, *, workers: int) -> La
 def _dask_client(address: str, workers: int) -> Iterator[Any]:
     distributed = _distributed()
     with ExitStack() as stack:
+        stack.enter_context(distributed.utils.silence_logging_cmgr(_dask_log_level()))
         if address == "local":
             address = stack.enter_context(_local_cluster(workers)).scheduler_address
         try:
@@ -141,10 +144,15 @@ def _local_cluster(workers: int) -> Iterator[Any]:
             threads_per_worker=1,
             processes=True,
             dashboard_address="127.0.0.1:0",
-            silence_logs=logging.CRITICAL,
+            silence_logs=_dask_log_level(),
         ) as cluster,
     ):
         yield cluster
+
+
+def _dask_log_level() -> int:
+    # What matters of it (dead workers, a lost scheduler) is said by the crew.
+    return logging.INFO if log.isEnabledFor(logging.DEBUG) else logging.CRITICAL
 
 
 def _distributed() -> Any:
