@@ -253,7 +253,7 @@ PATH_RULES: list[tuple[str, Callable[[PathStore], dict[str, Any]], str]] = [
                 p.configuration, (1, 0), p.configuration[1, 0] + 0.1
             )
         },
-        "as long as path_length_total says (1 of",
+        "as long as path_length says (1 of",
     ),
 ]
 

@@ -72,7 +72,8 @@ def test_a_missing_file_says_what_makes_it(tmp_path: Path) -> None:
         (b'{"format": "reachmap.grasps"}', "looks like JSON"),
         (b"name: cell\n", "a text, not an HDF5 file"),
         (b"\x89PNG\r\n\x1a\n\0\0\0", "not an HDF5 file"),
-        (b"\x89HDF\r\n\x1a\n", "damaged, HDF5 cannot read it"),
+        (b"\x89HDF\r\n\x1a\n", "damaged, 8 of at least 48 bytes are left"),
+        (b"\x89HDF\r\n\x1a\n" + bytes(100), "damaged, HDF5 cannot read it"),
     ],
 )
 def test_foreign_files_are_named(tmp_path: Path, content: bytes, message: str) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from reachmap._typing import FloatArray
-from reachmap.geometry import AXES
 from reachmap.maps.consistency import (
     check_coordinates,
     check_goals,
@@ -36,6 +35,8 @@ _PATH_VALUES = (
     "path_length", "path_length_planned", "tcp_path_length", "execution_time",
     "planning_time", "planning_cpu_time", "simplification_time",
 )  # fmt: skip
+# The keys of reachmap.geometry.AXES, without waiting for SciPy.
+_AXES = tuple(f"{sign}{name}" for name in "xyz" for sign in "+-")
 _LENGTH_TOLERANCE_RAD = 1e-6
 
 
@@ -82,8 +83,8 @@ def _check_approach(tree: Tree) -> list[str]:
     axis = tree.attributes["approach_axis"]
     distance = tree.attributes["approach_distance_m"]
     problems = []
-    if axis not in AXES:
-        problems.append(f"approach_axis must be one of {', '.join(AXES)}")
+    if axis not in _AXES:
+        problems.append(f"approach_axis must be one of {', '.join(_AXES)}")
     if not isinstance(distance, float) or not 0.0 <= distance < np.inf:
         problems.append("approach_distance_m must be a length")
     return problems
@@ -248,7 +249,9 @@ BIN = Layout(
             is_flag=True,
         ),
         _measured("path_length", "rad", "Joint-space length of the whole path"),
-        _measured("path_length_planned", "rad", "Joint-space length of the planned part"),
+        _measured(
+            "path_length_planned", "rad", "Joint-space length of the planned part"
+        ),
         _measured("tcp_path_length", "m", "Length of the way of the TCP, whole path"),
         _measured("planning_time", "s", "Wall-clock time of the planner"),
         _measured("planning_cpu_time", "s", "CPU time of the planning thread"),

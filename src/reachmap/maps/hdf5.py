@@ -146,11 +146,18 @@ def tree_from_image(image: bytes) -> Tree:
         raise StructureError(f"HDF5 cannot read it: {reason}") from error
 
 
-def attributes_from_image(image: bytes) -> dict[str, Any]:
-    """Root attributes of an HDF5 image; StructureError if there is no reading it."""
+def identity_from_image(image: bytes) -> dict[str, str]:
+    """What an HDF5 image says it is: ``format`` and ``format_version``, if it does.
+
+    Raises
+    ------
+    StructureError
+        There is no reading it.
+    """
     try:
         with h5py.File(h5py.h5f.open_file_image(image)) as file:
-            return _read_attributes(file)
+            names = [n for n in ("format", "format_version") if n in file.attrs]
+            return {name: str(file.attrs[name]) for name in names}
     except Exception as error:
         raise StructureError("HDF5 cannot read it") from error
 

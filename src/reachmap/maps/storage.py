@@ -6,19 +6,21 @@ import re
 from collections.abc import Mapping
 from pathlib import Path
 
-from reachmap.errors import EngineError, MapFileError
+from reachmap.errors import EngineError, MapFileError, ReachmapError
 from reachmap.maps.contract import check_ranges, check_structure
 from reachmap.maps.hashing import content_sha256, integrity_sha256
 from reachmap.maps.hdf5 import (
+    MAX_BYTES,
     StructureError,
-    attributes_from_image,
+    identity_from_image,
     image_from_tree,
     tree_from_image,
 )
 from reachmap.maps.layouts import LAYOUTS, layout_of
+from reachmap.maps.probe import reason_against
 from reachmap.maps.publish import publish
 from reachmap.maps.schema import FORMAT_VERSION, Layout
-from reachmap.maps.seal import SIGNATURE, seal, unseal
+from reachmap.maps.seal import SIGNATURE, named_size, seal, unseal
 from reachmap.maps.tree import Tree
 
 MAX_PROBLEMS = 8
@@ -65,7 +67,7 @@ def load(path: Path, layout: Layout | None = None) -> tuple[Tree, Layout]:
     """
     image = read_image(path, layout)
     try:
-        found = identify(path, attributes_from_image(image), layout)
+        found = identify(path, identity_from_image(image), layout)
         tree = tree_from_image(image)
     except StructureError as error:
         raise MapFileError(f"{path}: damaged, {error}; {_expected(layout)}") from error
@@ -96,26 +98,38 @@ def check_hashes(tree: Tree) -> list[str]:
 
 
 def read_image(path: Path, layout: Layout | None = None) -> bytes:
-    """Read a file as an HDF5 image that is what was written, as far as bytes tell."""
+    """Read a file as an HDF5 image that is safe to hand to the HDF5 library."""
     image, intact = unseal(read_bytes(path, layout))
     if not image.startswith(SIGNATURE):
         raise MapFileError(f"{path}: {_foreign(image)}; {_expected(layout)}")
-    if intact is False:
-        raise MapFileError(
-            f"{path}: damaged, its bytes do not match its seal; {_expected(layout)}"
-        )
+    if damage := _damage(image, intact):
+        raise MapFileError(f"{path}: damaged, {damage}; {_expected(layout)}")
     return image
+
+
+def _damage(image: bytes, intact: bool | None) -> str:
+    """What is wrong with the bytes of an image, "" if nothing is."""
+    if intact is not None:
+        return "" if intact else "its bytes do not match its seal"
+    size = named_size(image)
+    if size is None or len(image) < size:
+        return f"{len(image)} of {size or 'at least 48'} bytes are left"
+    return reason_against(image)
 
 
 def read_bytes(path: Path, layout: Layout | None = None) -> bytes:
     """Read a file, in words a user can act on when that fails."""
     try:
-        return Path(path).read_bytes()
+        size = Path(path).stat().st_size
+        data = Path(path).read_bytes() if size <= MAX_BYTES else b""
     except FileNotFoundError as error:
         raise MapFileError(f"{path}: no such file; {_expected(layout)}") from error
     except OSError as error:
         reason = error.strerror or type(error).__name__
         raise MapFileError(f"{path}: cannot be read ({reason})") from error
+    if size > MAX_BYTES:
+        raise MapFileError(f"{path}: larger than {MAX_BYTES >> 30} GiB")
+    return data
 
 
 def artefact_kind(path: Path) -> str | None:
@@ -124,11 +138,9 @@ def artefact_kind(path: Path) -> str | None:
     Never raises. Only the seal and the root attributes are looked at.
     """
     try:
-        image, intact = unseal(Path(path).read_bytes())
-        if intact is False or not image.startswith(SIGNATURE):
-            return None
-        layout = layout_of(attributes_from_image(image).get("format"))
-    except (OSError, ValueError, StructureError):
+        image = read_image(Path(path))
+        layout = layout_of(identity_from_image(image).get("format"))
+    except (ReachmapError, ValueError, StructureError):
         return None
     return layout.kind if layout else None
 
