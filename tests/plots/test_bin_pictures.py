@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
+from collections import Counter
+
 import numpy as np
 import pytest
 from scipy.stats import binomtest
-from synthetic_maps import statuses, synthetic_bin_map, synthetic_placement
+from synthetic_maps import (
+    statuses,
+    synthetic_bin_map,
+    synthetic_placement,
+    synthetic_workspace_map,
+)
 
 from reachmap.cell.orientations import ConeFamily
 from reachmap.geometry import yaw_transform
@@ -13,6 +20,7 @@ from reachmap.maps.records import Status
 from reachmap.plots.approach import STATUS_COLOURS, draw_approach, sunburst_sectors
 from reachmap.plots.bin_map import draw_costs, draw_reachability
 from reachmap.plots.bin_view import percent_after
+from reachmap.plots.causes import causes_of, draw_causes
 from reachmap.plots.placement import draw_placement, placement_words
 from reachmap.plots.saturation import draw_saturation, saturation_of, wilson_interval
 from reachmap.plots.squares import percent_text
@@ -191,6 +199,32 @@ def test_sunburst_colours_are_the_states() -> None:
         shown = [bytes(np.rint(c[:3] * 255).astype("u1")).hex()
                  for c in burst.get_facecolor()]  # fmt: skip
         assert shown == expected
+
+
+def test_causes_are_counted_over_all_frames() -> None:
+    """States and blocking pairs, the pair that blocks most first."""
+    bin_map = synthetic_bin_map(0.5, shape=(1, 3, 4, 6, 2))
+    causes = causes_of(bin_map)
+    assert sum(causes.states.values()) == causes.total == 72
+    assert causes.states[Status.PATH_FOUND] == int((bin_map.status == 1).sum())
+    by_hand = Counter(
+        bin_map.body_pairs[index]
+        for index in bin_map.blocking_pair.ravel()
+        if index >= 0
+    )
+    assert dict(causes.pairs) == dict(by_hand)
+    counts = [count for _, count in causes.pairs]
+    assert counts == sorted(counts, reverse=True)
+    reached = 100.0 * causes.states[Status.PATH_FOUND] / 72.0
+    title = draw_causes(bin_map).texts[0].get_text()
+    assert title == f"{reached:.1f} % reached, and why the rest is not"
+
+
+def test_causes_of_a_workspace_map_cover_all_cubes() -> None:
+    """Every frame of every cube counts once; the shared row is in both."""
+    workspace = synthetic_workspace_map(np.full((2, 5, 3), 0.5), shared_row=2)
+    assert causes_of(workspace).total == 2 * 6 * 3 * 4
+    draw_causes(synthetic_workspace_map(np.ones((1, 2, 2))))
 
 
 def test_placement_words_tell_pose_and_scores() -> None:

@@ -41,7 +41,7 @@ def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
     """Leave the drawing out where only files and names matter."""
     monkeypatch.setattr("reachmap.plots.files.figure_bytes", lambda *a, **k: PNG)
     for name in ("level", "overview", "reachability", "costs", "approach",
-                 "saturation", "placement"):  # fmt: skip
+                 "saturation", "causes", "placement"):  # fmt: skip
         monkeypatch.setattr(f"reachmap.plots.albums.draw_{name}", lambda *a, **k: None)
 
 
@@ -63,6 +63,7 @@ def test_default_is_the_path_map_of_the_current_folder(folder: Path) -> None:
         "heatmaps/path_z+0.00.png",
         "heatmaps/path_z+0.10.png",
         "heatmaps/path_overview.png",
+        "heatmaps/causes.png",
     ]
     for name in written:
         assert (folder / name).read_bytes().startswith(PNG)
@@ -144,7 +145,13 @@ def test_bin_map_gives_the_pictures_of_a_bin(folder: Path) -> None:
     """Reachability, costs, approach directions, saturation; layers are named."""
     write_bin_map(folder / "bin.h5", synthetic_bin_map(shape=(1, 2, 3, 4, 2)))
     stems = [Path(name).stem for name in names(run("bin.h5"))]
-    assert stems == ["bin_reachability", "bin_costs", "bin_approach", "bin_saturation"]
+    assert stems == [
+        "bin_reachability",
+        "bin_costs",
+        "bin_approach",
+        "bin_saturation",
+        "bin_causes",
+    ]
     write_bin_map(folder / "two.h5", synthetic_bin_map(shape=(2, 1, 2, 3, 1)))
     stems = [Path(name).stem for name in names(run("two.h5", "-o", "two", "--csv"))]
     assert "bin_reachability_layer+0.05" in stems
@@ -214,4 +221,4 @@ def test_map_with_a_cell_of_another_kind_is_drawn(folder: Path) -> None:
     workspace = synthetic_workspace_map(np.full((1, 2, 2), 0.5))
     strange = synthetic_provenance(cell_resolved_json="{}")
     write_workspace_map(folder / "s.h5", replace(workspace, provenance=strange))
-    assert len(names(run("s.h5"))) == 2
+    assert len(names(run("s.h5"))) == 3

@@ -15,6 +15,7 @@ from reachmap.maps.records import BinMap, BinPlacement, WorkspaceMap
 from reachmap.plots.approach import draw_approach
 from reachmap.plots.bin_map import draw_costs, draw_reachability
 from reachmap.plots.bin_view import percent_after
+from reachmap.plots.causes import draw_causes
 from reachmap.plots.files import Picture, Table, level_table
 from reachmap.plots.heatmap import draw_level
 from reachmap.plots.levels import QUANTITY_NAMES, Quantity, level_names
@@ -36,14 +37,14 @@ def workspace_album(
     percent_map: PercentMap = "RdYlGn",
     tables: bool = False,
 ) -> list[Picture | Table]:
-    """List the pictures of a workspace map: one per level, then the overview.
+    """List the pictures of a workspace map: levels, overview, causes.
 
     Parameters
     ----------
     workspace : WorkspaceMap
     quantities : sequence of str
     heights : sequence of float
-        Levels to draw [m]; without any, all of them and the overview.
+        Levels to draw [m], nothing else; without any, everything.
     percent_map : str
     tables : bool
         Add a CSV file for each level.
@@ -67,7 +68,17 @@ def workspace_album(
                     draw=partial(draw_overview, stack, percent_map=percent_map),
                 )
             )
+    if not heights:
+        items.append(_causes_picture(workspace, "causes"))
     return items
+
+
+def _causes_picture(record: WorkspaceMap | BinMap, name: str) -> Picture:
+    return Picture(
+        name=name,
+        title="States of the test frames, and what is in the way",
+        draw=partial(draw_causes, record),
+    )
 
 
 def _level_items(
@@ -156,7 +167,7 @@ def bin_album(
         title="Test grasps reached over the number of attempts",
         draw=partial(draw_saturation, bin_map),
     )
-    return [*items, saturation]
+    return [*items, saturation, _causes_picture(bin_map, "bin_causes")]
 
 
 def placement_album(
