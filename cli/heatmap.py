@@ -60,10 +60,10 @@ def command(artefact: Path, **settings: Any) -> None:
 
     FILE is a workspace map, workspace.h5 by default; a bin map or a placement is drawn
     as well. A workspace map gives a picture of every level, seen from above, and one
-    of all levels together; a bin map gives its reachability after one and after all
-    attempts, the saturation, the costs, the approach directions and the causes; a placement the
-    bin on its level, the runner-up and the places that were considered. The names of
-    the files are printed.
+    of all levels together, a bin map its reachability after one and after all
+    attempts, the saturation, the costs and the approach directions; both show why test
+    frames are not reached. A placement gives the bin on its level, the runner-up and
+    the places that were considered. The names of the files are printed.
 
     Example: reachmap heatmap workspace.h5 --quantity all -o heatmaps
     """
