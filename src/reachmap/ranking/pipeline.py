@@ -11,13 +11,13 @@ from reachmap import __version__
 from reachmap._typing import FloatArray
 from reachmap.errors import SettingsError
 from reachmap.geometry import rotation_from_quaternion_wxyz, transform_from_parts
-from reachmap.maps.records import Stamp
 from reachmap.ranking.frames import place_grasps
 from reachmap.ranking.grasp_arrays import GraspList
 from reachmap.ranking.queries import queries_from_arrays
 from reachmap.ranking.ranked_list import RankedList
 from reachmap.ranking.ranker import Ranker
 from reachmap.ranking.settings import RankSettings
+from reachmap.ranking.table import TERMS
 
 
 def rank_list(
@@ -56,20 +56,22 @@ def rank_list(
         grasps=grasps,
         queries=queries,
         ranking=ranker.rank_queries(queries, settings, grasps.scores),
-        settings=_header(ranker.stamp, settings),
+        settings=_header(ranker, settings),
         with_likeness=settings.likeness > 0,
     )
 
 
-def _header(stamp: Stamp, settings: RankSettings) -> Mapping[str, Any]:
+def _header(ranker: Ranker, settings: RankSettings) -> Mapping[str, Any]:
+    maxima = dict(zip(TERMS, ranker.table.maxima.tolist(), strict=True))
     return {
         "version": __version__,
-        "map_sha256": stamp.content_sha256,
-        "cell_sha256": stamp.cell_sha256,
+        "map_sha256": ranker.stamp.content_sha256,
+        "cell_sha256": ranker.stamp.cell_sha256,
         "weights": list(settings.weights),
         "likeness": settings.likeness,
         "neighbours": settings.neighbours,
         "roll": settings.roll,
+        "maxima": maxima,
     }
 
 

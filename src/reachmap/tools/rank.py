@@ -122,10 +122,10 @@ def rank(
     _check_request(sources, top, chart_top)
     targets = check_targets(sources, output, overwrite=overwrite)
     _check_chart(chart, overwrite=overwrite)
+    lists = [_read(source, list_format) for source in sources]
     bin_map = read_bin_map(Path(map_path))
     if cell is not None:
         _check_cell(bin_map, map_path, cell, overrides, force=force)
-    lists = [_read(source, list_format) for source in sources]
     ranker = Ranker(bin_map)
     ranked = [_rank_one(grasps, ranker, settings, list_format) for grasps in lists]
     story = ""
