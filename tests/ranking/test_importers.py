@@ -176,6 +176,13 @@ def test_archives_that_expand_are_refused(tmp_path):
         read_grasps(path, frame="bin")
 
 
+def test_more_rows_than_the_limit(tmp_path):
+    """A huge array is refused before a grasp is made of each row."""
+    path = saved(tmp_path / "s.npy", np.zeros((100_001, 7), np.float32))
+    with pytest.raises(GraspListError, match="100001 rows; the limit is 100000"):
+        read_grasps(path, frame="bin")
+
+
 def test_rows_that_are_not_finite(tmp_path):
     """NaN in an array is refused with the row."""
     rows = graspnet_rows()

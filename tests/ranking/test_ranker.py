@@ -289,6 +289,14 @@ def test_a_path_without_a_successful_attempt_has_no_cost():
     assert np.isinf(ranking.cost[0])
 
 
+def test_a_map_without_a_reachable_test_grasp():
+    """Nothing is divided by zero; every grasp is unreachable, in supplied order."""
+    ranker = Ranker(make_bin_map(reachable=0.0))
+    ranking = ranker.rank(ranker.table.points, np.tile([0, 0, -1.0], (35, 1)))
+    assert not ranking.reachable.any()
+    assert ranking.order.tolist() == list(range(35))
+
+
 def test_no_grasps():
     """An empty list has an empty ranking."""
     ranking = RANKER.rank(np.zeros((0, 3)), np.zeros((0, 3)), neighbours=3)

@@ -23,7 +23,7 @@ from reachmap.ranking.grasp_fields import (
 from reachmap.ranking.json_text import JsonPath
 
 FORMAT: Final = "reachmap.grasps"
-MAX_GRASPS: Final = 200_000
+MAX_GRASPS: Final = 100_000
 LENGTH_UNITS: Final[Mapping[str, float]] = {"m": 1.0, "mm": 1e-3}
 QUADRANTS: Final = ("NE", "NW", "SE", "SW", None)
 

@@ -15,7 +15,7 @@ from reachmap.ranking.importers import FORMATS, NATIVE, document_from_bytes
 from reachmap.ranking.json_text import JsonPath, dotted, limited, lines_of
 
 STDIN: Final = "-"
-MAX_BYTES: Final = 64 * 2**20
+MAX_BYTES: Final = 32 * 2**20
 
 
 def read_grasps(

@@ -13,9 +13,10 @@ import numpy as np
 
 from reachmap._typing import FloatArray
 from reachmap.errors import GraspListError
+from reachmap.ranking.grasp_document import MAX_GRASPS
 
 UNIT_TOLERANCE: Final = 1e-2
-MAX_NPZ_BYTES: Final = 64 * 2**20
+MAX_NPZ_BYTES: Final = 32 * 2**20
 GRASPNET_COLUMNS: Final = 17
 SUCTION_COLUMNS: Final = 7
 MAX_VALUE: Final = 1e9
@@ -97,6 +98,8 @@ def _checked(rows: FloatArray, source: str) -> FloatArray:
             f"{source}: expected {GRASPNET_COLUMNS} columns (GraspNet) or "
             f"{SUCTION_COLUMNS} (suction); the array has the shape {rows.shape}"
         )
+    if len(rows) > MAX_GRASPS:
+        raise GraspListError(f"{source}: {len(rows)} rows; the limit is {MAX_GRASPS}")
     # The comparison is false for NaN as well.
     bad = np.flatnonzero(~(np.abs(rows) < MAX_VALUE).all(axis=1))
     if bad.size:
