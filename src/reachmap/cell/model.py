@@ -137,7 +137,7 @@ class RobotSpec(Record):
     limits: JointLimits = Field(
         JointLimits(), description="Limits that the URDF lacks or that are tightened."
     )
-    ik: IkSpec = Field(IkSpec(), description="How inverse kinematics is solved.")
+    ik: IkSpec = Field(IkSpec(), description="Settings of inverse kinematics.")
 
 
 FieldOfView = Annotated[float, Field(gt=0, lt=180, allow_inf_nan=False)]
@@ -368,7 +368,7 @@ class Cell(Record):
     bin_scan: BinScanSpec = Field(BinScanSpec(), description="The bin scan.")
     planner: PlannerSpec = Field(PlannerSpec(), description="The planner.")
     placement: PlacementSpec = Field(
-        PlacementSpec(), description="Where the bin may stand."
+        PlacementSpec(), description="Limits that place-bin keeps to."
     )
     seed: int = Field(1, ge=0, lt=2**63, description="Seed of everything random.")
 

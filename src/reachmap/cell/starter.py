@@ -74,7 +74,9 @@ def guess_tip(robot: UrdfDescription, base: str) -> str:
 
     tip = max(robot.links, key=rank)
     if not robot.chain(base, tip):
-        raise SettingsError(f"{robot.name}: the URDF has no joint that moves")
+        raise SettingsError(
+            f"{robot.name}: the URDF has no joint that moves anything against {base!r}"
+        )
     return tip
 
 

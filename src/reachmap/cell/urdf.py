@@ -67,18 +67,29 @@ class UrdfDescription:
     mesh_scales: dict[str, tuple[float, float, float]]
 
     def chain(self, base: str, tip: str) -> tuple[str, ...]:
-        """List the moving joints on the way from one link to another, base first.
+        """List the moving joints on the way from one frame to another, base first.
 
-        The way goes up from ``tip``; joints between ``base`` and the ancestor it
-        shares with ``tip`` are not included.
+        Frames are links, or joints, which stand for their child link. The way ends
+        at the last ancestor that ``base`` and ``tip`` share.
         """
+        shared = {link for link, _ in self._way_up(base)}
+        names = []
+        for link, joint in self._way_up(tip):
+            if link in shared:
+                break
+            if joint is not None and joint.moves:
+                names.append(joint.name)
+        return tuple(reversed(names))
+
+    def _way_up(self, frame: str) -> Iterator[tuple[str, UrdfJoint | None]]:
+        """Yield each link from a frame to the root, with the joint above it."""
         above = {joint.child: joint for joint in self.joints.values()}
-        names: list[str] = []
-        link = tip
-        while link != base and link in above:
-            names.append(above[link].name)
-            link = above[link].parent
-        return tuple(n for n in reversed(names) if self.joints[n].moves)
+        is_joint = frame in self.joints and frame not in self.links
+        link = self.joints[frame].child if is_joint else frame
+        while (joint := above.get(link)) is not None:
+            yield link, joint
+            link = joint.parent
+        yield link, None
 
     def leaves(self) -> tuple[str, ...]:
         """Links without children, in the order of the file."""
