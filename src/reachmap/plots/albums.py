@@ -16,6 +16,7 @@ from reachmap.plots.approach import draw_approach
 from reachmap.plots.bin_map import draw_costs, draw_reachability
 from reachmap.plots.bin_view import percent_after
 from reachmap.plots.causes import draw_causes
+from reachmap.plots.comparison import MapChange, draw_change_sheet, draw_comparison
 from reachmap.plots.files import Picture, Table, level_table
 from reachmap.plots.heatmap import draw_level
 from reachmap.plots.levels import QUANTITY_NAMES, Quantity, level_names
@@ -186,6 +187,25 @@ def placement_album(
     if not tables:
         return [picture]
     return [picture, Table(name="placement", text=_candidate_table(placement))]
+
+
+def comparison_album(
+    maps: MapChange, *, percent_map: PercentMap = "RdYlGn"
+) -> list[Picture | Table]:
+    """List the pictures of two maps: the level that changed most, then all levels."""
+    one = Picture(
+        name="comparison",
+        title=maps.headline,
+        draw=partial(draw_comparison, maps, percent_map=percent_map),
+    )
+    if maps.z.size == 1:
+        return [one]
+    sheet = Picture(
+        name="comparison_overview",
+        title=maps.headline,
+        draw=partial(draw_change_sheet, maps),
+    )
+    return [one, sheet]
 
 
 def _candidate_table(placement: BinPlacement) -> str:

@@ -19,6 +19,7 @@ from matplotlib.patches import Patch
 from reachmap._typing import CodeArray, FloatArray, IntArray
 from reachmap.geometry import rotation_from_quaternion_wxyz
 from reachmap.maps.records import BinMap, Status
+from reachmap.maps.statistics import STATUS_NAMES
 from reachmap.plots.bin_view import frame_bin, view_of
 from reachmap.plots.squares import axis_titles, cell_edges
 from reachmap.plots.style import (
@@ -41,15 +42,6 @@ STATUS_COLOURS: dict[Status, str] = {
     Status.NO_IK: "#4a1030",
     Status.ERROR: "#000000",
     Status.NOT_ATTEMPTED: "#d3d3d3",
-}
-STATUS_NAMES: dict[Status, str] = {
-    Status.PATH_FOUND: "path found",
-    Status.NO_PATH_FOUND: "no path found",
-    Status.APPROACH_BLOCKED: "approach blocked",
-    Status.IK_IN_COLLISION: "every IK solution in collision",
-    Status.NO_IK: "no IK solution",
-    Status.ERROR: "error",
-    Status.NOT_ATTEMPTED: "not attempted",
 }
 LEFT, TOP, BOTTOM, RIGHT = 0.80, 0.95, 0.62, 2.8
 WIDEST, TALLEST = 12.5, 9.5

@@ -8,9 +8,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import FancyArrowPatch, Rectangle
 
-from reachmap._typing import BoolArray, FloatArray
+from reachmap._typing import FloatArray
 from reachmap.geometry import inverse_transform
-from reachmap.maps.records import BinMap, Status
+from reachmap.maps.records import BinMap
+from reachmap.maps.statistics import attempted as attempted
+from reachmap.maps.statistics import found_after as found_after
 from reachmap.plots.context import context_of
 from reachmap.plots.squares import cell_edges
 from reachmap.plots.style import BIN_COLOUR, INK
@@ -58,16 +60,6 @@ def view_of(bin_map: BinMap) -> BinView:
     context = context_of(bin_map.provenance)
     wall = NOMINAL_WALL if context.cell is None else context.cell.bin.wall
     return BinView(bin_map=bin_map, wall=wall, cell_name=context.name)
-
-
-def attempted(bin_map: BinMap) -> BoolArray:
-    """Test grasps that the scan came to, shape (nl, ny, nx, no)."""
-    return np.asarray(bin_map.status != Status.NOT_ATTEMPTED)
-
-
-def found_after(bin_map: BinMap, attempts: int) -> BoolArray:
-    """Test grasps with a path in the first attempts, shape (nl, ny, nx, no)."""
-    return np.asarray(bin_map.path_found[..., :attempts].any(axis=-1))
 
 
 def percent_after(bin_map: BinMap, attempts: int) -> FloatArray:

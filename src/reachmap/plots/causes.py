@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from reachmap._typing import CodeArray, IntArray
 from reachmap.maps.records import BinMap, Status, WorkspaceMap
-from reachmap.plots.approach import STATUS_COLOURS, STATUS_NAMES
+from reachmap.maps.statistics import STATUS_NAMES
+from reachmap.maps.statistics import causes_of as causes_of
+from reachmap.plots.approach import STATUS_COLOURS
 from reachmap.plots.context import context_of
 from reachmap.plots.style import (
     INK,
@@ -24,44 +23,6 @@ from reachmap.plots.style import (
 PAIRS_SHOWN = 10
 LETTERS = 40
 LEFT, RIGHT, WIDTH, ROW = 2.9, 0.9, 4.6, 0.27
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Causes:
-    """How many test frames are in each state, and what blocks them.
-
-    Attributes
-    ----------
-    states : mapping
-        State to number of test frames, without those that do not occur.
-    pairs : tuple of (str, int)
-        Pair of bodies to the number of test frames it blocks, the most first.
-    total : int
-        Number of test frames that were attempted.
-    """
-
-    states: dict[Status, int]
-    pairs: tuple[tuple[str, int], ...]
-    total: int
-
-
-def causes_of(record: WorkspaceMap | BinMap) -> Causes:
-    """Count states and blocking pairs over all test frames of a map."""
-    if isinstance(record, BinMap):
-        status: CodeArray = record.status.ravel()
-        pair: IntArray = record.blocking_pair.ravel()
-    else:
-        cubes = record.cubes.values()
-        status = np.concatenate([cube.status.ravel() for cube in cubes])
-        pair = np.concatenate([cube.blocking_pair.ravel() for cube in cubes])
-    states = {code: int((status == code).sum()) for code in STATUS_NAMES}
-    number = np.bincount(pair[pair >= 0], minlength=len(record.body_pairs))
-    order = np.argsort(-number, kind="stable")
-    return Causes(
-        states={code: count for code, count in states.items() if count},
-        pairs=tuple((record.body_pairs[i], int(number[i])) for i in order if number[i]),
-        total=int((status != Status.NOT_ATTEMPTED).sum()),
-    )
 
 
 @drawing()

@@ -9,6 +9,8 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from reachmap._typing import FloatArray
 from reachmap.maps.records import WorkspaceMap
+from reachmap.maps.statistics import best_level as best_level
+from reachmap.maps.statistics import level_means as level_means
 
 Quantity: TypeAlias = Literal["path", "ik", "ik-free", "difference"]
 QUANTITIES: tuple[Quantity, ...] = ("path", "ik", "ik-free", "difference")
@@ -29,20 +31,6 @@ def quantity_values(workspace: WorkspaceMap, quantity: Quantity) -> FloatArray:
     if quantity == "ik-free":
         return workspace.ik_free_reachability
     return np.asarray(workspace.ik_reachability - workspace.path_reachability)
-
-
-def level_means(values: FloatArray) -> FloatArray:
-    """Mean over the attempted squares of each level, (nz, ny, nx) to (nz,)."""
-    attempted = ~np.isnan(values)
-    total = np.where(attempted, values, 0.0).sum(axis=(1, 2))
-    with np.errstate(invalid="ignore"):
-        return np.asarray(total / attempted.sum(axis=(1, 2)))
-
-
-def best_level(values: FloatArray) -> int | None:
-    """Index of the level with the highest mean, the lowest of equals."""
-    means = level_means(values)
-    return None if np.isnan(means).all() else int(np.nanargmax(means))
 
 
 def best_patch(level: FloatArray, shape: tuple[int, int] = (3, 3)) -> tuple[int, int]:

@@ -35,7 +35,7 @@ def draw_overview(stack: LevelStack, *, percent_map: PercentMap = "RdYlGn") -> F
     scale_in = min(WIDEST / (high[0] - low[0]), TALLEST / (high[1] - low[1]))
     width, height = (high - low) * scale_in
     panels = stack.z.size + 1
-    columns = _columns(panels, width / height)
+    columns = sheet_columns(panels, width / height)
     rows = -(-panels // columns)
     across, down = width + GAP_X, height + GAP_Y
     figure = new_figure(
@@ -73,7 +73,7 @@ def draw_overview(stack: LevelStack, *, percent_map: PercentMap = "RdYlGn") -> F
     return figure
 
 
-def _columns(panels: int, aspect: float) -> int:
+def sheet_columns(panels: int, aspect: float) -> int:
     """Columns that bring the sheet close to 5:4 and leave few empty places."""
 
     def cost(columns: int) -> float:

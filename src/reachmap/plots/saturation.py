@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
-import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from scipy.special import ndtri
 
-from reachmap._typing import FloatArray, IntArray
 from reachmap.maps.records import BinMap
-from reachmap.plots.bin_view import attempted, found_after, view_of
+from reachmap.maps.statistics import Saturation
+from reachmap.maps.statistics import saturation_of as saturation_of
+from reachmap.maps.statistics import wilson_interval as wilson_interval
+from reachmap.plots.bin_view import view_of
 from reachmap.plots.style import (
     BIN_COLOUR,
     INK,
@@ -21,71 +19,6 @@ from reachmap.plots.style import (
     new_figure,
     put_title,
 )
-
-
-def wilson_interval(
-    hits: FloatArray, total: FloatArray, confidence: float = 0.95
-) -> tuple[FloatArray, FloatArray]:
-    """Wilson score interval of a share, as fractions.
-
-    It keeps its coverage near 0 and 1, where the normal approximation gives
-    intervals that leave [0, 1] or have no width.
-
-    Examples
-    --------
-    >>> low, high = wilson_interval(np.array(0.0), np.array(10.0))
-    >>> float(low), round(float(high), 4)
-    (0.0, 0.2775)
-    """
-    z2 = float(ndtri(0.5 + confidence / 2.0)) ** 2
-    share = hits / total
-    middle = (share + z2 / (2.0 * total)) / (1.0 + z2 / total)
-    spread = share * (1.0 - share) / total + z2 / (4.0 * total**2)
-    half = np.sqrt(z2 * spread) / (1.0 + z2 / total)
-    return np.maximum(middle - half, 0.0), np.minimum(middle + half, 1.0)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Saturation:
-    """Test grasps reached over the number of attempts, in percent.
-
-    Attributes
-    ----------
-    attempts : int array, shape (nr,)
-    share, low, high : array, shape (nr,)
-        Share reached, and its Wilson 95 % interval.
-    proved : float
-        Share that an attempt or the roadmap proves reachable.
-    total : int
-        Number of test grasps that were tried.
-    """
-
-    attempts: IntArray
-    share: FloatArray
-    low: FloatArray
-    high: FloatArray
-    proved: float
-    total: int
-
-
-def saturation_of(bin_map: BinMap) -> Saturation:
-    """Count what the first 1, 2, … attempts reach."""
-    tried = attempted(bin_map)
-    total = max(int(tried.sum()), 1)
-    attempts = np.arange(1, bin_map.path_found.shape[-1] + 1)
-    hits = np.array(
-        [int((found_after(bin_map, int(k)) & tried).sum()) for k in attempts], float
-    )
-    low, high = wilson_interval(hits, np.full_like(hits, total))
-    known = bin_map.connected.astype(bool) | found_after(bin_map, int(attempts[-1]))
-    return Saturation(
-        attempts=attempts,
-        share=100.0 * hits / total,
-        low=100.0 * low,
-        high=100.0 * high,
-        proved=100.0 * int((known & tried).sum()) / total,
-        total=total,
-    )
 
 
 @drawing()

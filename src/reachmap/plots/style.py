@@ -27,7 +27,7 @@ PERCENT_MAPS: tuple[PercentMap, ...] = ("RdYlGn", "viridis", "cividis")
 Format: TypeAlias = Literal["png", "svg"]
 
 DIFFERENCE_MAP = "Purples"
-CHANGE_MAP = "PuOr"
+CHANGE_MAP = "PRGn"
 COST_MAP = "YlGnBu"
 NOT_ATTEMPTED = "#d3d3d3"
 INK, MUTED, RULE = "#1c1c1c", "#5f5f5f", "#9a9a9a"
