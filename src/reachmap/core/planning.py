@@ -26,8 +26,11 @@ from reachmap.errors import EngineError
 ou.setLogLevel(ou.LogLevel.LOG_NONE)
 
 _CLOCK_EVERY = 64
+# A planner asks once per iteration whether to go on. Some iterations check nothing;
+# a planner that only makes such iterations is to end by a count as well.
+_CALLS_PER_CHECK = 20
 _OPTIMISING = frozenset(
-    {"RRTstar", "PRMstar", "BITstar", "InformedRRTstar", "SORRTstar", "AORRTC"}
+    {"RRTstar", "BITstar", "InformedRRTstar", "SORRTstar", "AORRTC"}
 )
 
 
@@ -105,6 +108,9 @@ class Planner:
         max_checks : int, optional
             Budget in state checks; default: the cell's.
         """
+        inside = ((goals >= self._lower) & (goals <= self._upper)).all(axis=1)
+        rows = np.flatnonzero(inside)
+        goals = goals[rows]
         budget = _Budget(
             self.motions,
             max_checks or self.spec.max_checks,
@@ -128,7 +134,7 @@ class Planner:
             unverified += path is None
         return PlanResult(
             path=path,
-            goal=-1 if path is None else _nearest_row(goals, path[-1]),
+            goal=-1 if path is None else int(rows[_nearest_row(goals, path[-1])]),
             checks=budget.used(),
             planning_time_s=wall,
             planning_cpu_time_s=cpu,
@@ -251,6 +257,7 @@ class _Budget:
         self._begin = self._checker.checks
         self._deadline = time.monotonic() + seconds
         self._calls = 0
+        self._most_calls = _CALLS_PER_CHECK * checks
         self.out_of_time = False
 
     def used(self) -> int:
@@ -259,9 +266,9 @@ class _Budget:
 
     def spent(self) -> bool:
         """Whether the checks, or the seconds of the safety net, are used up."""
-        if self._checker.checks >= self._limit:
-            return True
         self._calls += 1
+        if self._checker.checks >= self._limit or self._calls >= self._most_calls:
+            return True
         if self._calls % _CLOCK_EVERY == 0 and time.monotonic() > self._deadline:
             self.out_of_time = True
         return self.out_of_time
