@@ -175,14 +175,24 @@ def placement_album(
     placement: BinPlacement,
     workspace: WorkspaceMap | None = None,
     *,
+    camera_view: FloatArray | None = None,
     percent_map: PercentMap = "RdYlGn",
     tables: bool = False,
 ) -> list[Picture | Table]:
-    """List the picture of a placement, on the map it was chosen from if given."""
+    """List the picture of a placement, on the map it was chosen from if given.
+
+    ``camera_view``, shape (n, 2), is drawn as an outline in robot_base [m].
+    """
     picture = Picture(
         name="placement",
         title=placement_words(placement)[0],
-        draw=partial(draw_placement, placement, workspace, percent_map=percent_map),
+        draw=partial(
+            draw_placement,
+            placement,
+            workspace,
+            camera_view=camera_view,
+            percent_map=percent_map,
+        ),
     )
     if not tables:
         return [picture]

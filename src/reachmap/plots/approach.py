@@ -43,7 +43,7 @@ STATUS_COLOURS: dict[Status, str] = {
     Status.ERROR: "#000000",
     Status.NOT_ATTEMPTED: "#d3d3d3",
 }
-LEFT, TOP, BOTTOM, RIGHT = 0.80, 0.95, 0.62, 2.8
+LEFT, TOP, BOTTOM, RIGHT = 0.80, 0.95, 0.62, 3.0
 WIDEST, TALLEST = 12.5, 9.5
 # Directions closer than this are one direction at several rolls.
 SAME_DIRECTION = 1e-3

@@ -84,7 +84,7 @@ def _draw_proved(axes: Axes, proved: float) -> None:
 
 def _set_limits(axes: Axes, data: Saturation) -> None:
     top, bottom = max(float(data.high.max()), data.proved), float(data.low.min())
-    span = max(top - bottom, 1.0)
+    span = max(top - bottom, 4.0)
     axes.set_ylim(max(0.0, bottom - 0.25 * span), min(102.0, top + 0.22 * span))
     axes.set_xlim(0.6, int(data.attempts[-1]) + 0.6)
     axes.set_xticks(data.attempts)
