@@ -1,1 +1,1 @@
-"""Where to put the bin, and the configuration it is imaged from."""
+"""Where the bin goes, and the configuration it is imaged from."""
