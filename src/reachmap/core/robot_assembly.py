@@ -156,7 +156,10 @@ def reduced_model(
     ]
     limits = merge_limits(ranges, cell)
     locked = [full.getJointId(n) for n in list(full.names)[1:] if n not in moving]
-    model = pin.buildReducedModel(full, locked, q_locked)
+    try:
+        model = pin.buildReducedModel(full, locked, q_locked)
+    except ValueError as error:  # a link and a locked joint of one name, say
+        raise SceneError(f"robot.urdf: joints cannot be locked ({error})") from error
     if list(model.names)[1:] != list(moving):
         raise SceneError("robot.urdf: the joints from base to TCP are not one chain")
     model.lowerPositionLimit = limits.lower
