@@ -1,0 +1,94 @@
+"""Workspace scan by roadmap: time, memory, growth, and ratio to planning per frame.
+
+Run it on an idle machine: ``make bench`` or ``python benchmarks/bench_workspace.py``.
+"""
+
+from __future__ import annotations
+
+import resource
+import time
+from collections.abc import Sequence
+
+import numpy as np
+
+from reachmap.cell.loading import read_cell
+from reachmap.core.scene import Scene
+from reachmap.sampling.frames import workspace_frames
+from reachmap.scans.progress import Progress
+from reachmap.scans.survey_run import SurveyContext, run_survey
+from reachmap.scans.workspace_per_frame import plan_frames
+from reachmap.scans.workspace_roadmap import connect_survey, results_of_connection
+
+CELL = "ur5-eye-in-hand"
+SAMPLE = 100
+# Points along x and y of each cube, and the distance of levels [m]: about 1, 4, 16
+# times as many frames over the same space.
+SIZES = {"1x": ((11, 6), 0.1), "4x": ((21, 12), 0.1), "16x": ((42, 24), 0.1)}
+
+
+def scan(overrides: Sequence[str], workers: int) -> tuple[int, int, dict[str, float]]:
+    """Frames, reachable frames, and seconds per phase of one scan."""
+    loaded = read_cell(CELL, overrides)
+    scene = Scene.build(loaded, with_bin=False)
+    spec = loaded.cell.workspace_scan
+    cubes = workspace_frames(spec, loaded.cell.robot.tcp.approach_axis)
+    context = SurveyContext(
+        loaded=loaded,
+        with_bin=False,
+        grids=tuple(cube.frames for cube in cubes),
+        approach_m=0.0,
+    )
+    begin = time.perf_counter()
+    survey = run_survey(
+        context,
+        workers=workers,
+        executor="processes",
+        progress=Progress("", quiet=True),
+    )
+    middle = time.perf_counter()
+    connection = connect_survey(
+        scene, survey, attempts=spec.repeats, seed=loaded.cell.seed
+    )
+    results = results_of_connection(survey, connection)
+    end = time.perf_counter()
+    seconds = {"survey": middle - begin, "connect": end - middle}
+    return len(results.status), int((results.status == 1).sum()), seconds
+
+
+def per_frame_cpu_s(sample: int) -> float:
+    """CPU seconds per frame of planning from scratch to a random sample."""
+    scene = Scene.build(read_cell(CELL), with_bin=False)
+    cell = scene.loaded.cell
+    cubes = workspace_frames(cell.workspace_scan, cell.robot.tcp.approach_axis)
+    poses = np.concatenate([c.frames.transforms().reshape(-1, 4, 4) for c in cubes])
+    rows = np.random.default_rng(0).permutation(len(poses))[:sample]
+    begin = time.process_time()
+    plan_frames(scene, poses[rows], rows.tolist())
+    return (time.process_time() - begin) / sample
+
+
+def main() -> None:
+    """Print a line per size, then the ratio."""
+    for name, (grid, z_step) in SIZES.items():
+        overrides = [f"workspace_scan.z_step={z_step}"]
+        overrides += [f"workspace_scan.cubes.{k}.grid={list(grid)}" for k in (0, 1)]
+        frames, reached, seconds = scan(overrides, workers=2)
+        total = sum(seconds.values())
+        phases = ", ".join(f"{k} {v:.1f} s" for k, v in seconds.items())
+        peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+        print(
+            f"{name:>4} {frames:7d} frames, {reached} reachable: {total:.1f} s wall "
+            f"({phases}), {1e6 * total / frames:.0f} us a frame, peak {peak:.0f} MB"
+        )
+    begin = time.process_time()
+    frames, _, _ = scan([], workers=1)
+    ours = (time.process_time() - begin) / frames
+    theirs = per_frame_cpu_s(SAMPLE)
+    print(
+        f"per frame, CPU: roadmap {1e3 * ours:.3f} ms, planned from scratch "
+        f"{1e3 * theirs:.1f} ms ({SAMPLE} frames): ratio {theirs / ours:.0f}"
+    )
+
+
+if __name__ == "__main__":
+    main()
