@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 import re
+import textwrap
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from reachmap.cell.urdf import UrdfDescription, UrdfJoint
-from reachmap.cell.yaml_writer import scalar
+from reachmap.cell.yaml_writer import WIDTH, scalar
 from reachmap.errors import SettingsError
 
 # Names that tool flanges have in published robot descriptions, best first.
@@ -146,7 +147,13 @@ def _robot(c: StarterChoices) -> str:
         f'approach_axis: "{approach_axis(c.tip)}"}}',
     ]
     names = ", ".join(joint.name for joint in c.joints)
-    lines.append(f"  # Joints that move: {names}.")
+    lines += textwrap.wrap(
+        f"Joints that move: {names}.",
+        WIDTH,
+        initial_indent="  # ",
+        subsequent_indent="  # ",
+        break_on_hyphens=False,
+    )
     if c.locked:
         lines.append("  # Joints that stay where they are [deg, or m if they slide].")
         lines.append(f"  locked_joints_deg: {scalar(dict(c.locked))}")
@@ -197,12 +204,12 @@ def _surroundings(c: StarterChoices) -> str:
 #   xyz: [0, -0.1, 0.05]
 #   range_m: [0.5, 0.6]
 #   field_of_view_deg: [57, 36]
-bodies: []                     # everything solid that is not in the URDF, such as
+bodies: []                     # what is not in the URDF; replace [] by entries like
 #  - name: gripper
 #    attach_to: {c.tip}
 #    shape: {{cylinder: {{radius: 0.015, length: 0.1}}}}
 #    pose: {{xyz: [0, 0, 0.05]}}   # centre of the shape
-#    touch: [{c.tip}]
+#    touch: []               # links and bodies it may touch
 #  - name: table
 #    attach_to: world
 #    shape: {{box: [1.5, 1.5, 0.05]}}

@@ -188,7 +188,15 @@ def _loaded(choices: StarterChoices, folder: Path, srdf: str) -> LoadedCell:
 
 def _samples(arm: RobotModel) -> FloatArray:
     rng = np.random.default_rng(0)
-    return np.asarray(rng.uniform(arm.lower_rad, arm.upper_rad, (SAMPLES, arm.dof)))
+    # Beyond half a turn an arm only winds itself up.
+    half_turn = np.where(arm.is_revolute, np.pi, np.inf)
+    low, high = (
+        np.maximum(arm.lower_rad, -half_turn),
+        np.minimum(arm.upper_rad, half_turn),
+    )
+    if (low > high).any():
+        low, high = arm.lower_rad, arm.upper_rad
+    return np.asarray(rng.uniform(low, high, (SAMPLES, arm.dof)))
 
 
 def _always_touching(scene: Scene, Q: FloatArray) -> list[tuple[str, str]]:
@@ -233,7 +241,8 @@ def _scan_configuration(scene: Scene, Q: FloatArray, tip: str) -> FloatArray | N
     off_centre = np.linalg.norm(over[:, :2], axis=1) / reach
     height = np.abs(over[:, 2] / reach - 0.5)
     downwards = -sign * T[:, 2, column]
-    return np.asarray(Q[np.argmax(downwards - off_centre - height)])
+    effort = np.abs(Q).mean(axis=1) / np.pi
+    return np.asarray(Q[np.argmax(downwards - off_centre - height - effort)])
 
 
 def _as_user(choices: StarterChoices, q: FloatArray) -> dict[str, float]:
