@@ -132,6 +132,11 @@ def read_bytes(path: Path, layout: Layout | None = None) -> bytes:
     return data
 
 
+def is_sealed(path: Path) -> bool:
+    """Whether a file still carries the seal it was written with, and it fits."""
+    return unseal(read_bytes(path))[1] is True
+
+
 def artefact_kind(path: Path) -> str | None:
     """Kind of an artefact, as in ``"bin_map"``; None for anything else.
 
@@ -182,7 +187,7 @@ def _foreign(data: bytes) -> str:
     """Name what a file is that is not HDF5."""
     if not data:
         return "an empty file"
-    if data.lstrip()[:1] in (b"{", b"["):
+    if re.match(rb"\s*(\{|\[\s*[\[{\"\d-])", data):
         return "looks like JSON, not an HDF5 file"
     if b"\0" not in data[:4096]:
         return "a text, not an HDF5 file"

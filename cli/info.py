@@ -1,0 +1,31 @@
+"""``reachmap info``: any artefact or journal in a few numbers."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import click
+
+from reachmap.cli.options import INPUT_FILE, json_option
+
+
+@click.command()
+@click.argument("artefact", metavar="FILE", type=INPUT_FILE)
+@json_option
+def command(artefact: Path, as_json: bool) -> None:
+    """Summarise an artefact or a journal.
+
+    A workspace map: reachability level by level with its counts, why frames are not
+    reached and which bodies are in the way, how many planning attempts it rests on. A
+    bin map: reachability after one attempt, two, … with intervals, causes, quadrants,
+    lengths and times. A placement: pose, score, margin, runner-up. All: the cell,
+    settings and run behind it. A journal is summed up as far as it goes.
+
+    Example: reachmap info bin.h5
+    """
+    from reachmap.tools.info import info
+    from reachmap.tools.info_text import info_text
+
+    found = info(artefact)
+    click.echo(json.dumps(found.facts()) if as_json else info_text(found))

@@ -1,0 +1,114 @@
+"""``info``: any artefact or journal goes in, its summary comes out."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import Enum
+from pathlib import Path
+from typing import Any, TypeAlias
+
+from reachmap.maps.any_file import Artefact, kind_of
+from reachmap.maps.bin_summary import BinSummary, summarise_bin
+from reachmap.maps.placement_summary import PlacementSummary, summarise_placement
+from reachmap.maps.records import BinMap, WorkspaceMap
+from reachmap.maps.tree import plain
+from reachmap.maps.workspace_summary import WorkspaceSummary, summarise_workspace
+from reachmap.tools.artefacts import read_artefact_or_journal
+
+Summary: TypeAlias = WorkspaceSummary | BinSummary | PlacementSummary
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ArtefactInfo:
+    """An artefact in a few numbers, and where it comes from.
+
+    Attributes
+    ----------
+    path : Path
+    kind : str
+        As in ``"bin_map"``.
+    finished : bool
+        False for the journal of a run that goes on or was interrupted.
+    record : WorkspaceMap, BinMap or BinPlacement
+    summary : WorkspaceSummary, BinSummary or PlacementSummary
+    """
+
+    path: Path
+    kind: str
+    finished: bool
+    record: Artefact
+    summary: Summary
+
+    @property
+    def cell_name(self) -> str:
+        """Name of the cell, "" if the artefact does not tell."""
+        try:
+            cell = json.loads(self.record.provenance.cell_resolved_json)
+        except ValueError:
+            return ""
+        name = cell.get("name") if isinstance(cell, dict) else None
+        return name if isinstance(name, str) else ""
+
+    def facts(self) -> dict[str, Any]:
+        """Everything as JSON values; NaN is null."""
+        stamp, provenance = self.record.stamp, self.record.provenance
+        facts = {
+            "file": str(self.path),
+            "kind": self.kind,
+            "finished": self.finished,
+            **dataclasses.asdict(stamp),
+            "cell": self.cell_name,
+            "overrides": provenance.overrides,
+            "source_sha256": provenance.source_sha256,
+            "settings": provenance.settings,
+            "packages": provenance.packages,
+            "run": dataclasses.asdict(self.record.run),
+            "summary": dataclasses.asdict(self.summary),
+        }
+        return dict(_json_ready(facts))
+
+
+def info(path: Path) -> ArtefactInfo:
+    """Summarise an artefact, or what the journal of a run holds so far.
+
+    Parameters
+    ----------
+    path : Path
+
+    Raises
+    ------
+    MapFileError
+        The file is missing, damaged, or neither artefact nor journal.
+    """
+    record, finished = read_artefact_or_journal(path)
+    summary: Summary
+    if isinstance(record, WorkspaceMap):
+        summary = summarise_workspace(record)
+    elif isinstance(record, BinMap):
+        summary = summarise_bin(record)
+    else:
+        summary = summarise_placement(record)
+    return ArtefactInfo(
+        path=path,
+        kind=kind_of(record),
+        finished=finished,
+        record=record,
+        summary=summary,
+    )
+
+
+def _json_ready(value: Any) -> Any:
+    """Values as JSON has them: keys are names, NaN and infinities are null."""
+    if isinstance(value, Mapping):
+        return {
+            key.name.lower() if isinstance(key, Enum) else str(key): _json_ready(item)
+            for key, item in value.items()
+        }
+    value = plain(value)
+    if isinstance(value, list):
+        return [_json_ready(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
