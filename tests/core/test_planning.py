@@ -51,7 +51,7 @@ def test_paths_into_the_bin_are_free_on_the_meshes():
 
 
 def test_a_seed_is_a_path():
-    """The same seed gives the same path, also after other work; another seed differs."""
+    """A seed gives the same path, also after other work; another seed differs."""
     scene = scene_of("ur5-eye-in-hand")
     goals = bin_goals(scene, 1)[0]
     start = scene.scan_configuration

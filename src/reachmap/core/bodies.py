@@ -67,7 +67,7 @@ def bin_boxes(spec: BinSpec) -> tuple[BinBox, ...]:
     x, y, depth = spec.inner
     wall = spec.wall
     bottom = spec.bottom if spec.bottom is not None else wall
-    outer_x, outer_y = x + 2 * wall, y + 2 * wall
+    outer_y = y + 2 * wall
     height, middle = depth + bottom, (depth - bottom) / 2
     walls = [
         (

@@ -123,8 +123,8 @@ class CollisionChecker:
         """Whether the robot may move by a distance from q, whichever way.
 
         True is a proof: no motion in which no point moves further than ``distance_m``
-        brings a pair closer than the safety margin. False says nothing; the answer is conservative, as
-        it uses convex hulls and the next wider step of the ladder.
+        brings a pair closer than the safety margin. False says nothing; the answer is
+        conservative, as it uses convex hulls and the next wider step of the ladder.
         """
         for step, manager, _ in self._ladder:
             if step >= distance_m:
@@ -191,6 +191,6 @@ def _with_convex_hulls(geometry: Any) -> Any:
             points.extend(list(np.asarray(body.geometry.vertices(), float)))
             try:
                 body.geometry = coal.Convex.convexHull(points, True, "Qt")
-            except Exception:  # noqa: BLE001 - a flat mesh has no hull; it stays a mesh
+            except Exception:  # a flat mesh has no hull; it stays a mesh
                 continue
     return copy
