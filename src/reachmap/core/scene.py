@@ -89,18 +89,30 @@ class Scene:
         SceneError
             It is outside joint limits, or two bodies touch; they are named.
         """
-        source = self.loaded.source
-        problems = [
-            f"{source}: scan_configuration: {name} is outside its limits"
-            for name in self.robot.outside_limits(self.scan_configuration)
-        ]
-        pairs = self.checker.touching_pairs(self.scan_configuration)
-        problems += [
-            f"{source}: scan_configuration: {a} touches {b}"
-            for a, b in (self.checker.body_pairs[k].split(" | ") for k in pairs)
-        ]
+        problems = self.scan_problems()
         if problems:
-            raise SceneError(problems)
+            source = self.loaded.source
+            raise SceneError(f"{source}: {problem}" for problem in problems)
+
+    def scan_problems(self) -> tuple[str, ...]:
+        """Say why the scan configuration cannot be taken; empty where it can."""
+        q, robot = self.scan_configuration, self.robot
+        problems = []
+        for name in robot.outside_limits(q):
+            k = robot.joint_names.index(name)
+            turns = bool(robot.is_revolute[k])
+            value, low, high = (
+                float(np.degrees(row[k]) if turns else row[k])
+                for row in (q, robot.lower_rad, robot.upper_rad)
+            )
+            problems.append(
+                f"scan_configuration: {name} = {value:.6g} {'deg' if turns else 'm'} "
+                f"is outside its limits [{low:.6g}, {high:.6g}]"
+            )
+        for index in self.checker.touching_pairs(q):
+            first, second = self.checker.body_pairs[index].split(" | ")
+            problems.append(f"scan_configuration: {first} touches {second}")
+        return tuple(problems)
 
     def tcp_path_points(self, path: FloatArray, step_rad: float = 0.02) -> FloatArray:
         """TCP positions along a joint path, shape (n, 3) [m]."""

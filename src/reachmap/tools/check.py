@@ -133,29 +133,8 @@ def check_loaded(loaded: LoadedCell) -> CellCheck:
         test_frames=cell.workspace_scan.count(),
         test_grasps=cell.bin_scan.count(),
         warnings=loaded.warnings,
-        problems=scan_problems(scene),
+        problems=scene.scan_problems(),
     )
-
-
-def scan_problems(scene: Scene) -> tuple[str, ...]:
-    """Say why the scan configuration cannot be taken: limits, bodies that touch."""
-    q = scene.scan_configuration
-    robot = scene.robot
-    problems = []
-    for name in robot.outside_limits(q):
-        k = robot.joint_names.index(name)
-        factor, unit = (180.0 / np.pi, "deg") if robot.is_revolute[k] else (1.0, "m")
-        value, low, high = (
-            factor * row[k] for row in (q, robot.lower_rad, robot.upper_rad)
-        )
-        problems.append(
-            f"scan_configuration: {name} = {value:.6g} {unit} is outside its limits "
-            f"[{low:.6g}, {high:.6g}]"
-        )
-    for index in scene.checker.touching_pairs(q):
-        first, second = scene.checker.body_pairs[index].split(" | ")
-        problems.append(f"scan_configuration: {first} touches {second}")
-    return tuple(problems)
 
 
 def shape_text(shape: Shape) -> str:
