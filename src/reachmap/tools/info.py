@@ -4,10 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
-import math
-from collections.abc import Mapping
 from dataclasses import dataclass
-from enum import Enum
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -15,9 +12,9 @@ from reachmap.maps.any_file import Artefact, kind_of
 from reachmap.maps.bin_summary import BinSummary, summarise_bin
 from reachmap.maps.placement_summary import PlacementSummary, summarise_placement
 from reachmap.maps.records import BinMap, WorkspaceMap
-from reachmap.maps.tree import plain
 from reachmap.maps.workspace_summary import WorkspaceSummary, summarise_workspace
 from reachmap.tools.artefacts import read_artefact_or_journal
+from reachmap.tools.json_values import json_ready
 
 Summary: TypeAlias = WorkspaceSummary | BinSummary | PlacementSummary
 
@@ -69,7 +66,7 @@ class ArtefactInfo:
             "run": dataclasses.asdict(self.record.run),
             "summary": dataclasses.asdict(self.summary),
         }
-        return dict(_json_ready(facts))
+        return dict(json_ready(facts))
 
 
 def info(path: Path) -> ArtefactInfo:
@@ -99,16 +96,3 @@ def info(path: Path) -> ArtefactInfo:
         record=record,
         summary=summary,
     )
-
-
-def _json_ready(value: Any) -> Any:
-    """Values as JSON has them: keys are names, NaN and infinities are null."""
-    if isinstance(value, Mapping):
-        return {
-            key.name.lower() if isinstance(key, Enum) else str(key): _json_ready(item)
-            for key, item in value.items()
-        }
-    value = plain(value)
-    if isinstance(value, list):
-        return [_json_ready(item) for item in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
 from reachmap.maps.bin_summary import MEASURES, BinSummary, Spread
+from reachmap.maps.cell_changes import flat_json
 from reachmap.maps.placement_file import is_turn
 from reachmap.maps.placement_summary import CandidateSummary, PlacementSummary
 from reachmap.maps.records import Status
@@ -240,12 +240,13 @@ def _candidate_row(name: str, item: CandidateSummary) -> list[str]:
 def _origin_lines(info: ArtefactInfo) -> list[str]:
     stamp, provenance = info.record.stamp, info.record.provenance
     run = info.record.run
+    settings = (f"{key}={text}" for key, text in flat_json(provenance.settings))
     facts = [
         ("cell", f"{info.cell_name or '?'}, contents {stamp.cell_sha256[:12]}"),
         ("overrides", ", ".join(provenance.overrides)),
         ("seed", str(stamp.seed)),
         ("source", provenance.source_sha256[:12]),
-        ("settings", ", ".join(_flat(provenance.settings))),
+        ("settings", ", ".join(settings)),
         ("packages", ", ".join(f"{k} {v}" for k, v in provenance.packages.items())),
     ]
     if run.started:
@@ -261,17 +262,6 @@ def _origin_lines(info: ArtefactInfo) -> list[str]:
 
 def _seconds(phases: Mapping[str, float]) -> str:
     return ", ".join(f"{name} {value:.1f}" for name, value in phases.items())
-
-
-def _flat(value: Any, prefix: str = "") -> list[str]:
-    """Nested settings as ``key.key=value``."""
-    if isinstance(value, Mapping):
-        return [
-            text
-            for key, item in value.items()
-            for text in _flat(item, f"{prefix}.{key}" if prefix else str(key))
-        ]
-    return [f"{prefix}={value}"]
 
 
 def _number(value: float) -> str:

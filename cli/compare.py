@@ -1,0 +1,87 @@
+"""``reachmap compare``: what changed from one map to another."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Literal
+
+import click
+
+from reachmap.cli.options import (
+    INPUT_FILE,
+    OUTPUT_PATH,
+    json_option,
+    overwrite_option,
+)
+
+
+@click.command()
+@click.argument("before", metavar="BEFORE", type=INPUT_FILE)
+@click.argument("after", metavar="AFTER", type=INPUT_FILE)
+@click.option(
+    "--frame",
+    type=click.Choice(["robot_base", "bin"]),
+    default="robot_base",
+    show_default=True,
+    help="Where poses must agree; bin compares bins that stand in different places.",
+)
+@click.option(
+    "--tolerance",
+    type=(click.FloatRange(min=0, min_open=True), click.FloatRange(0, 90, True)),
+    default=(0.1, 0.1),
+    show_default=True,
+    metavar="MM DEG",
+    help="Poses closer than this are the same.",
+)
+@click.option(
+    "--fail-under",
+    type=float,
+    metavar="POINTS",
+    help="Exit with 1 if path reachability changes by less than this many percentage "
+    "points; -0.5 allows a loss of half a point.",
+)
+@click.option(
+    "--picture",
+    type=OUTPUT_PATH,
+    metavar="PATH",
+    help="Draw the change: a .png or .svg file for the level that changed most, or a "
+    "folder for that and an overview.",
+)
+@overwrite_option
+@json_option
+def command(
+    before: Path,
+    after: Path,
+    frame: Literal["robot_base", "bin"],
+    tolerance: tuple[float, float],
+    fail_under: float | None,
+    picture: Path | None,
+    overwrite: bool,
+    as_json: bool,
+) -> None:
+    """Compare two maps of the same kind, frame by frame.
+
+    BEFORE and AFTER are two workspace maps or two bin maps, as of a cell before and
+    after its camera housing became slimmer. Test frames are matched by pose, never by
+    index. Says how reachability changed and whether that is more than chance, which
+    frames were gained and lost, why, on which squares, and what differs between the
+    two cells.
+
+    Example: reachmap compare bin.h5 slim/bin.h5 --fail-under -0.5
+    """
+    from reachmap.tools.compare import compare, draw
+    from reachmap.tools.compare_text import compare_text
+
+    found = compare(
+        before,
+        after,
+        frame=frame,
+        tolerance_m=tolerance[0] / 1000.0,
+        tolerance_deg=tolerance[1],
+    )
+    if picture is not None:
+        draw(found, picture, overwrite=overwrite)
+    click.echo(json.dumps(found.facts()) if as_json else compare_text(found))
+    if fail_under is not None:
+        found.require(fail_under)

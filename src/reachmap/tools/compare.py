@@ -1,0 +1,203 @@
+"""``compare``: two maps of one kind go in, what changed comes out."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from reachmap.errors import GateFailedError, SettingsError
+from reachmap.maps.any_file import kind_of
+from reachmap.maps.comparison import Comparison, SquareChange, compare_maps
+from reachmap.maps.pose_matching import TOLERANCE_DEG, TOLERANCE_M, Frame
+from reachmap.maps.records import BinMap, BinPlacement, WorkspaceMap
+from reachmap.tools.artefacts import read_artefact_or_journal
+from reachmap.tools.json_values import json_ready
+
+if TYPE_CHECKING:
+    from reachmap.plots.comparison import MapChange
+
+SUFFIXES = (".png", ".svg")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MapComparison:
+    """Two maps, and what changed from one to the other.
+
+    Attributes
+    ----------
+    paths : (Path, Path)
+    before, after : WorkspaceMap or BinMap
+    result : Comparison
+    """
+
+    paths: tuple[Path, Path]
+    before: WorkspaceMap | BinMap
+    after: WorkspaceMap | BinMap
+    result: Comparison
+
+    @property
+    def names(self) -> tuple[str, str]:
+        """What to call the maps: their file names, or paths where these agree."""
+        a, b = self.paths
+        return (str(a), str(b)) if a.name == b.name else (a.name, b.name)
+
+    @property
+    def headline(self) -> str:
+        """The result in a sentence."""
+        r = self.result
+        share = [100.0 * n / r.common for n in (r.reached_before, r.reached_after)]
+        return (
+            f"path reachability {share[0]:.2f} % to {share[1]:.2f} % "
+            f"({r.change:+.2f} points)"
+        )
+
+    def facts(self) -> dict[str, Any]:
+        """Everything as JSON values, the squares with common frames one by one."""
+        facts = {
+            "before": str(self.paths[0]),
+            "after": str(self.paths[1]),
+            "headline": self.headline,
+            "change_points": self.result.change,
+            **{
+                item.name: getattr(self.result, item.name)
+                for item in dataclasses.fields(self.result)
+                if item.name not in ("squares", "losses", "gains")
+            },
+            "losses": [dataclasses.asdict(item) for item in self.result.losses],
+            "gains": [dataclasses.asdict(item) for item in self.result.gains],
+            "squares": _square_facts(self.result.squares),
+        }
+        return dict(json_ready(facts))
+
+    def require(self, points: float) -> None:
+        """Raise GateFailedError if the change is below a number of points."""
+        if self.result.change < points:
+            raise GateFailedError(
+                f"{self.headline}: the change is below {points:+g} points"
+            )
+
+
+def compare(
+    before: Path,
+    after: Path,
+    *,
+    frame: Frame = "robot_base",
+    tolerance_m: float = TOLERANCE_M,
+    tolerance_deg: float = TOLERANCE_DEG,
+) -> MapComparison:
+    """Compare two maps of the same kind, frame by frame, matched by pose.
+
+    Parameters
+    ----------
+    before, after : Path
+        Workspace maps or bin maps, or journals of unfinished runs.
+    frame : {"robot_base", "bin"}
+        Where poses must agree; "bin" compares bins that stand in different places.
+    tolerance_m, tolerance_deg : float
+        Poses closer than this are the same [m, deg].
+
+    Raises
+    ------
+    MapFileError
+        A file cannot be read.
+    SettingsError
+        The maps are of different kinds or have no pose in common.
+    """
+    a, b = (read_artefact_or_journal(path)[0] for path in (before, after))
+    kinds = [kind_of(record).replace("_", " ") for record in (a, b)]
+    if isinstance(a, BinPlacement) or isinstance(b, BinPlacement):
+        found = before if isinstance(a, BinPlacement) else after
+        raise SettingsError(
+            f"{found}: a bin placement; compare takes workspace maps or bin maps"
+        )
+    if kinds[0] != kinds[1]:
+        raise SettingsError(
+            f"{before} is a {kinds[0]}, {after} a {kinds[1]}; "
+            "compare takes two maps of the same kind"
+        )
+    result = compare_maps(
+        a, b, frame=frame, tolerance_m=tolerance_m, tolerance_deg=tolerance_deg
+    )
+    return MapComparison(paths=(before, after), before=a, after=b, result=result)
+
+
+def draw(
+    comparison: MapComparison, output: Path, *, overwrite: bool = False
+) -> tuple[Path, ...]:
+    """Draw a comparison.
+
+    Parameters
+    ----------
+    comparison : MapComparison
+    output : Path
+        A file name in .png or .svg for the level that changed most, or a folder for
+        that and an overview of all levels.
+
+    Returns
+    -------
+    tuple of Path
+        The files written.
+    """
+    from reachmap.plots.albums import comparison_album
+    from reachmap.plots.files import write_all
+
+    items = comparison_album(map_change(comparison))
+    folder, suffix = output, ".png"
+    if output.suffix in SUFFIXES:
+        items = [dataclasses.replace(items[0], name=output.stem)]
+        folder, suffix = output.parent, output.suffix
+    return write_all(
+        folder,
+        items,
+        kind="svg" if suffix == ".svg" else "png",
+        config_sha256=comparison.after.stamp.config_sha256,
+        overwrite=overwrite,
+    )
+
+
+def map_change(comparison: MapComparison) -> MapChange:
+    """Bring a comparison into the form that pictures are drawn from."""
+    from reachmap.plots.comparison import MapChange
+    from reachmap.plots.context import context_of
+
+    squares, after = comparison.result.squares, comparison.after
+    in_bin = isinstance(after, BinMap)
+    return MapChange(
+        x=squares.x,
+        y=squares.y,
+        z=squares.z,
+        before=squares.percent("before"),
+        after=squares.percent("after"),
+        significant=squares.significant,
+        names=comparison.names,
+        headline=comparison.headline[:1].upper() + comparison.headline[1:],
+        details=_details(comparison.result),
+        frame="bin" if in_bin else "robot_base",
+        outlines=() if in_bin else context_of(after.provenance).standing,
+    )
+
+
+def _details(result: Comparison) -> str:
+    return f"{result.common} test frames, {result.gained} gained, {result.lost} lost"
+
+
+def _square_facts(squares: SquareChange) -> list[dict[str, Any]]:
+    rows = zip(*squares.frames.nonzero(), strict=True)
+    return [
+        {
+            "x": squares.x[k[2]],
+            "y": squares.y[k[1]],
+            "z": squares.z[k[0]],
+            "frames": squares.frames[k],
+            "before": squares.before[k],
+            "after": squares.after[k],
+            "change_points": 100.0
+            * (squares.after[k] - squares.before[k])
+            / squares.frames[k],
+            "p_value": squares.p_value[k],
+            "significant": squares.significant[k],
+        }
+        for k in rows
+    ]
