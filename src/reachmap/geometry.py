@@ -97,9 +97,7 @@ def direction_angle(a: FloatArray, b: FloatArray) -> FloatArray:
     return np.asarray(2.0 * np.arctan2(chord, total))
 
 
-def yaw_transform(
-    x: float, y: float, z: float, yaw_rad: float
-) -> FloatArray:
+def yaw_transform(x: float, y: float, z: float, yaw_rad: float) -> FloatArray:
     """Pose with a translation [m] and a rotation about z [rad], (4, 4)."""
     c, s = np.cos(yaw_rad), np.sin(yaw_rad)
     R = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])

@@ -29,7 +29,7 @@ def bang_bang_time(change, velocity, acceleration, dt=1e-4):
 
 
 def test_a_segment_takes_as_long_as_integration_says():
-    """The closed form agrees with a simulated trapezoid, both with and without cruise."""
+    """The closed form agrees with a simulated trapezoid, with and without cruise."""
     rng = np.random.default_rng(1)
     velocity, acceleration = np.array([2.0, 1.0, 3.0]), np.array([4.0, 5.0, 2.0])
     for size in (0.05, 0.5, 5.0):

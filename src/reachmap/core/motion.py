@@ -5,7 +5,7 @@ This is for searching.
 
 *Verification*: no point of the robot moves further than the verification distance
 between two checked configurations. Where the surroundings are far, a wider margin
-proves a longer stretch at once (see :class:`~reachmap.core.collision.CollisionChecker`);
+proves a longer stretch at once (:class:`~reachmap.core.collision.CollisionChecker`);
 where the safety margin is at least half the verification distance, as in the shipped
 cells, acceptance is a proof for the whole continuous motion. The idea is adaptive
 subdivision with distance bounds, after Schwarzer, Saha and Latombe, "Adaptive dynamic
