@@ -1,9 +1,4 @@
-"""Can a bin stand at a pose: does it meet what stands there, or the arm above it.
-
-The surroundings and the arm at one configuration stay where they are, and the bin is
-moved from pose to pose, which takes microseconds where a new scene takes a tenth of a
-second.
-"""
+"""Can a bin stand at a pose; which grasps do its walls deny to the tool itself."""
 
 from __future__ import annotations
 
@@ -15,9 +10,10 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from reachmap._typing import FloatArray
-from reachmap.core.bodies import ROOT, bin_boxes, build_geometry
-from reachmap.geometry import transform_from_parts
+from reachmap._typing import BoolArray, FloatArray
+from reachmap.core.bodies import ROOT, BinBox, bin_boxes, build_geometry
+from reachmap.core.placed import PlacedBodies, PlacedBody, bodies_at
+from reachmap.geometry import inverse_transform, transform_from_parts
 
 if TYPE_CHECKING:
     from reachmap.cell.loading import LoadedCell
@@ -38,7 +34,7 @@ class BinContact:
     other : str
         Body or link.
     at_scan : bool
-        Whether the other is carried by the arm, which is at the scan configuration.
+        Whether the arm carries the other, and is at the scan configuration.
     """
 
     part: str
@@ -47,7 +43,7 @@ class BinContact:
 
     @property
     def reason(self) -> str:
-        """Why the bin cannot stand there, without the part: few different texts."""
+        """Why the bin cannot stand there; the same text for all its parts."""
         where = " at the scan configuration" if self.at_scan else ""
         return f"the bin meets {self.other}{where}"
 
@@ -75,112 +71,154 @@ class BinFit:
     """
 
     def __init__(self, robot: RobotModel, loaded: LoadedCell, q: FloatArray) -> None:
-        self._robot, self._q = robot, np.asarray(q, float)
-        self._data = robot.model.createData()
-        spec = loaded.cell.bin
-        parts = bin_boxes(spec)
-        bodies = build_geometry(robot, loaded, with_bin=True)
-        names = list(bodies.names)
-        first = len(names) - len(parts)
-        allowed = _touches(loaded)
-        still = [
-            k
-            for k in range(first)
-            if bodies.geometry.geometryObjects[k].parentJoint == ROOT
-            and names[k] not in allowed
-        ]
-        margin = loaded.cell.collision.safety_margin_m
-        self._arm = _Movable(
-            bodies.geometry.copy(),
-            names,
-            [
-                (k, np.array(parts[k - first].centre_m))
-                for k in range(first, len(names))
-            ],
-            lambda pair: pair.first >= first or pair.second >= first,
-            margin,
+        bodies = bodies_at(robot, build_geometry(robot, loaded, with_bin=False), q)
+        boxes = bin_boxes(loaded.cell.bin)
+        # A little smaller, so that standing on a table is no collision.
+        still_parts = [*_parts(boxes, CONTACT_M), _part(_solid(boxes), CONTACT_M)]
+        margin_m = loaded.cell.collision.safety_margin_m
+        self._groups = (
+            _Group(
+                PlacedBodies(b for b in bodies if b.joint == ROOT), still_parts, loaded
+            ),
+            _Group(
+                PlacedBodies((b for b in bodies if b.joint != ROOT), margin_m),
+                _parts(boxes, 0.0),
+                loaded,
+            ),
         )
-        solid = _solid_of(parts)
-        geometry = bodies.geometry.copy()
-        for pair in list(geometry.collisionPairs):
-            geometry.removeCollisionPair(pair)
-        moved: list[tuple[int, FloatArray]] = []
-        for name, size, centre in [
-            *((p.name, p.size_m, p.centre_m) for p in parts),
-            (WHOLE, *solid),
-        ]:
-            # A little smaller, so that standing on a table is not a collision.
-            shape = coal.Box(*(np.array(size) - CONTACT_M))
-            index = geometry.addGeometryObject(
-                pin.GeometryObject(f"still {name}", ROOT, 0, pin.SE3.Identity(), shape)
-            )
-            names.append(name)
-            moved.append((index, np.array(centre)))
-            for other in still:
-                geometry.addCollisionPair(pin.CollisionPair(other, index))
-        self._still = _Movable(geometry, names, moved, lambda pair: True, 0.0)
 
     def contact(self, T_base_bin: FloatArray) -> BinContact | None:
         """First thing that the bin meets at a pose (4, 4), or None."""
-        T_root_bin = self._robot.T_root_base @ T_base_bin
-        for movable, at_scan in ((self._still, False), (self._arm, True)):
-            pair = movable.first_pair(
-                self._robot.model, self._data, self._q, T_root_bin
-            )
+        for group in self._groups:
+            pair = group.first_pair(T_base_bin)
             if pair is not None:
-                a, b = pair
-                part, other = (a, b) if a.startswith(WHOLE) else (b, a)
-                return BinContact(part=part, other=other, at_scan=at_scan)
+                part, body = pair
+                return BinContact(
+                    part=part, other=body.name, at_scan=body.joint != ROOT
+                )
         return None
 
 
-def _touches(loaded: LoadedCell) -> set[str]:
-    """Bodies that the cell lets the bin touch."""
-    cell = loaded.cell
-    with_bin = {body.name for body in cell.bodies if WHOLE in body.touch}
-    return {*cell.bin.touch, *with_bin}
+class ToolFit:
+    """Checks what the arm's last joint carries against the bin, arm aside.
+
+    Parameters
+    ----------
+    robot : RobotModel
+    loaded : LoadedCell
+    """
+
+    def __init__(self, robot: RobotModel, loaded: LoadedCell) -> None:
+        q = np.zeros(robot.dof)
+        geometry = build_geometry(robot, loaded, with_bin=False)
+        bodies = bodies_at(robot, geometry, q)
+        T_tcp_base = inverse_transform(_tcp_pose(robot, q))
+        self._tool = [
+            PlacedBody(name=b.name, joint=b.joint, shape=b.shape, T=T_tcp_base @ b.T)
+            for b in bodies
+            if b.joint == robot.tcp_joint
+        ]
+        boxes = bin_boxes(loaded.cell.bin)
+        self._walls = PlacedBodies(
+            (
+                PlacedBody(name=box.name, joint=ROOT, shape=shape, T=_at(centre))
+                for box, (_, shape, centre) in zip(
+                    boxes, _parts(boxes, 0.0), strict=True
+                )
+            ),
+            loaded.cell.collision.safety_margin_m,
+        )
+        self._allowed = _Touches(loaded)
+
+    def blocked(self, T_bin_tcp: FloatArray) -> BoolArray:
+        """Whether the tool touches the bin, shape (n, 4, 4) to (n,)."""
+        return np.array([self._is_blocked(T) for T in T_bin_tcp], bool)
+
+    def _is_blocked(self, T_bin_tcp: FloatArray) -> bool:
+        for body in self._tool:
+            touched = self._walls.first_touched(body.shape, T_bin_tcp @ body.T)
+            if touched >= 0 and not self._allowed(
+                self._walls.bodies[touched].name, body.name
+            ):
+                return True
+        return False
 
 
-def _solid_of(parts: Iterable[Any]) -> tuple[FloatArray, FloatArray]:
-    """Size and centre of the box around all parts of a bin, bin frame [m]."""
-    low = np.min([np.array(p.centre_m) - np.array(p.size_m) / 2 for p in parts], axis=0)
-    high = np.max(
-        [np.array(p.centre_m) + np.array(p.size_m) / 2 for p in parts], axis=0
-    )
-    return high - low, (low + high) / 2
+class _Touches:
+    """Which contacts with the bin the cell allows."""
+
+    def __init__(self, loaded: LoadedCell) -> None:
+        self._of_bin = set(loaded.cell.bin.touch)
+        self._of_body = {b.name: set(b.touch) for b in loaded.cell.bodies}
+
+    def __call__(self, part: str, other: str) -> bool:
+        return other in self._of_bin or bool(
+            self._of_body.get(other, set()) & {WHOLE, part}
+        )
 
 
-class _Movable:
-    """A geometry model of which some objects are moved together."""
+Part = tuple[str, Any, FloatArray]
+
+
+class _Group:
+    """Bodies with the shapes of the bin that must not touch them."""
 
     def __init__(
-        self,
-        geometry: Any,
-        names: list[str],
-        moved: list[tuple[int, FloatArray]],
-        keep: Any,
-        margin_m: float,
+        self, placed: PlacedBodies, parts: list[Part], loaded: LoadedCell
     ) -> None:
-        for pair in [p for p in geometry.collisionPairs if not keep(p)]:
-            geometry.removeCollisionPair(pair)
-        self._geometry, self._names, self._moved = geometry, list(names), moved
-        self._data = geometry.createData()
-        for request in self._data.collisionRequests:
-            request.security_margin = margin_m
+        self._placed, self._parts = placed, parts
+        self._allowed = _Touches(loaded)
+        corners = np.array(
+            [
+                centre + sign * np.array(shape.halfSide)
+                for _, shape, centre in parts
+                for sign in (-1, 1)
+            ]
+        )
+        self._low, self._high = corners.min(axis=0), corners.max(axis=0)
 
-    def first_pair(
-        self, model: Any, data: Any, q: FloatArray, T_root_bin: FloatArray
-    ) -> tuple[str, str] | None:
-        """Names of the first pair that touches, or None."""
-        objects = self._geometry.geometryObjects
-        for index, centre in self._moved:
-            T = T_root_bin @ transform_from_parts(np.eye(3), centre)
-            objects[index].placement = pin.SE3(np.ascontiguousarray(T))
-        if not pin.computeCollisions(model, data, self._geometry, self._data, q, True):
-            return None
-        for pair, result in zip(
-            self._geometry.collisionPairs, self._data.collisionResults, strict=True
-        ):
-            if result.isCollision():
-                return self._names[pair.first], self._names[pair.second]
+    def first_pair(self, T_base_bin: FloatArray) -> tuple[str, PlacedBody] | None:
+        """Part of the bin and the body it touches first, or None."""
+        R = T_base_bin[:3, :3]
+        centre = R @ ((self._low + self._high) / 2) + T_base_bin[:3, 3]
+        half = np.abs(R) @ ((self._high - self._low) / 2)
+        near = self._placed.near(centre - half, centre + half)
+        for name, shape, offset in self._parts:
+            among = [
+                k for k in near if not self._allowed(name, self._placed.bodies[k].name)
+            ]
+            hit = self._placed.touching(shape, T_base_bin @ _at(offset), among)
+            if hit >= 0:
+                return name, self._placed.bodies[hit]
         return None
+
+
+def _parts(boxes: Iterable[BinBox], shrink_m: float) -> list[Part]:
+    return [_part(box, shrink_m) for box in boxes]
+
+
+def _part(box: BinBox, shrink_m: float) -> Part:
+    size = np.maximum(np.array(box.size_m) - shrink_m, 1e-6)
+    return box.name, coal.Box(*size), np.array(box.centre_m)
+
+
+def _solid(boxes: tuple[BinBox, ...]) -> BinBox:
+    """The box around all parts of a bin, its inside included."""
+    centres = np.array([box.centre_m for box in boxes])
+    halves = np.array([box.size_m for box in boxes]) / 2
+    low, high = (centres - halves).min(axis=0), (centres + halves).max(axis=0)
+    x, y, z = (high - low).tolist()
+    u, v, w = ((low + high) / 2).tolist()
+    return BinBox(name=WHOLE, size_m=(x, y, z), centre_m=(u, v, w))
+
+
+def _at(p: FloatArray) -> FloatArray:
+    return transform_from_parts(np.eye(3), p)
+
+
+def _tcp_pose(robot: RobotModel, q: FloatArray) -> FloatArray:
+    """T_base_tcp at q; the last joint carries the TCP."""
+    data = robot.model.createData()
+    pin.forwardKinematics(robot.model, data, q)
+    T_root_joint = data.oMi[robot.tcp_joint].homogeneous
+    return np.asarray(robot.T_base_root @ T_root_joint @ robot.T_joint_tcp)

@@ -18,7 +18,7 @@ from reachmap._typing import BoolArray, FloatArray
 from reachmap.core.bodies import BodyGeometry
 from reachmap.core.chain import SerialChain
 from reachmap.core.displacement import MotionBound, displacement_bounds
-from reachmap.core.pairs import drop_pairs_that_never_meet, joints_between
+from reachmap.core.pairs import joints_between, pairs_that_never_meet
 
 if TYPE_CHECKING:
     from reachmap.core.robot import RobotModel
@@ -60,9 +60,14 @@ class CollisionChecker:
         self._geometry = bodies.geometry
         self.safety_margin_m = safety_margin_m
         bounds = displacement_bounds(robot.model, bodies.geometry)
-        proved = drop_pairs_that_never_meet(
-            robot.model, bodies.geometry, bounds, safety_margin_m
+        self._hulls = _with_convex_hulls(bodies.geometry)
+        proved = pairs_that_never_meet(
+            robot.model, self._hulls, bounds, safety_margin_m
         )
+        for first, second in proved:
+            pair = pin.CollisionPair(first, second)
+            bodies.geometry.removeCollisionPair(pair)
+            self._hulls.removeCollisionPair(pair)
         self.proved_pairs = tuple(
             f"{bodies.names[a]} | {bodies.names[b]}" for a, b in proved
         )
@@ -76,7 +81,6 @@ class CollisionChecker:
             SerialChain.from_robot(robot), robot.model, bodies.geometry, self.reach_m
         )
         self._shares = _margin_shares(bodies.geometry, bounds, self.reach_m)
-        self._hulls = _with_convex_hulls(bodies.geometry)
         self.checks = 0
         self.reset()
 

@@ -19,6 +19,10 @@ from reachmap._typing import FloatArray
 if TYPE_CHECKING:
     from reachmap.core.chain import SerialChain
 
+_SIGNS: FloatArray = (
+    np.array(np.meshgrid([-1.0, 1.0], [-1.0, 1.0], [-1.0, 1.0])).reshape(3, -1).T
+)
+
 
 def displacement_bounds(model: Any, geometry: Any) -> FloatArray:
     """Bounds R of all bodies and joints, shape (bodies, dof), [m/rad] or [m/m].
@@ -182,8 +186,5 @@ def _corner_points(shape: Any) -> FloatArray:
         shape.computeLocalAABB()
         low, high = np.asarray(box.min_), np.asarray(box.max_)
         centre, half = (low + high) / 2, (high - low) / 2
-        return centre + _SIGNS * half
-    return _SIGNS * half
-
-
-_SIGNS = np.array(np.meshgrid([-1.0, 1.0], [-1.0, 1.0], [-1.0, 1.0])).reshape(3, -1).T
+        return np.asarray(centre + _SIGNS * half)
+    return np.asarray(_SIGNS * half)

@@ -20,16 +20,17 @@ MAX_JOINTS = 2
 MAX_BOXES = 3000
 
 
-def drop_pairs_that_never_meet(
-    model: Any, geometry: Any, bounds: FloatArray, margin_m: float
+def pairs_that_never_meet(
+    model: Any, hulls: Any, bounds: FloatArray, margin_m: float
 ) -> tuple[tuple[int, int], ...]:
-    """Remove proved pairs from a geometry model.
+    """Find the collision pairs that are proved to stay apart.
 
     Parameters
     ----------
     model : pinocchio.Model
-    geometry : pinocchio.GeometryModel
-        Changed in place.
+    hulls : pinocchio.GeometryModel
+        Convex bodies that contain the true ones; distances between surfaces of many
+        triangles would take too long.
     bounds : array, shape (bodies, dof)
         See :func:`reachmap.core.displacement.displacement_bounds`.
     margin_m : float
@@ -38,17 +39,14 @@ def drop_pairs_that_never_meet(
     Returns
     -------
     tuple of (int, int)
-        Geometry indices of the pairs removed.
+        Geometry indices.
     """
-    prover = _Prover(model, geometry, bounds, margin_m)
-    proved = [
+    prover = _Prover(model, hulls, bounds, margin_m)
+    return tuple(
         (pair.first, pair.second)
-        for index, pair in enumerate(geometry.collisionPairs)
+        for index, pair in enumerate(hulls.collisionPairs)
         if prover.never_meets(index)
-    ]
-    for first, second in proved:
-        geometry.removeCollisionPair(pin.CollisionPair(first, second))
-    return tuple(proved)
+    )
 
 
 def joints_between(geometry: Any, pair: Any) -> tuple[range, int]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from reachmap._typing import CodeArray, FloatArray, IntArray
+from reachmap._typing import BoolArray, CodeArray, FloatArray, IntArray
 from reachmap.core.approach import StraightApproach
 from reachmap.core.scene import Scene
 from reachmap.maps.records import NO_PAIR, Status, freeze
@@ -140,7 +140,7 @@ class _Surveyor:
             way_size=np.array([len(way) for way in ways], np.int64),
         )
 
-    def _goals_of(self, k: int, Q: FloatArray, free: FloatArray) -> list[FloatArray]:
+    def _goals_of(self, k: int, Q: FloatArray, free: BoolArray) -> list[FloatArray]:
         """Approaches that a planner may aim at; none means a status with a cause."""
         if not free.any():
             self._status[k] = Status.IK_IN_COLLISION

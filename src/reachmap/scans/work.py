@@ -35,7 +35,9 @@ class Assemble(Protocol):
 class Write(Protocol):
     """Publishes the artefact under its final name, atomically."""
 
-    def __call__(self, path: Path, artefact: Any, *, overwrite: bool = False) -> None:
+    def __call__(
+        self, path: Path, artefact: Any, /, *, overwrite: bool = False
+    ) -> object:
         """Write ``artefact`` to ``path``."""
 
 

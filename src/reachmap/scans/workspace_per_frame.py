@@ -79,7 +79,7 @@ def plan_unit(state: _State, unit: int) -> dict[str, Any]:
     """Plan to the frames of one unit."""
     scene, begin = state.scene, unit * FRAMES_PER_UNIT
     frames = np.arange(begin, min(begin + FRAMES_PER_UNIT, len(state.poses)))
-    results = plan_frames(scene, state.poses[frames], frames)
+    results = plan_frames(scene, state.poses[frames], frames.tolist())
     return dataclasses.asdict(results)
 
 
@@ -102,12 +102,12 @@ def plan_frames(
     status = survey.status.copy()
     attempts, found = np.zeros(count, np.uint8), np.zeros(count, np.uint8)
     length, goal = np.full(count, np.nan), np.full((count, dof), np.nan)
-    for k in np.flatnonzero(status == Status.NOT_ATTEMPTED):
-        goals = survey.goals[survey.goals_of(int(k))]
+    for k in np.flatnonzero(status == Status.NOT_ATTEMPTED).tolist():
+        goals = survey.goals[survey.goals_of(k)]
         status[k] = Status.NO_PATH_FOUND
         for repeat in range(cell.workspace_scan.repeats):
             attempts[k] += 1
-            seed = attempt_seed(cell.seed, int(numbers[k]), repeat)
+            seed = attempt_seed(cell.seed, numbers[k], repeat)
             plan = scene.planner.plan(scene.scan_configuration, goals, seed)
             if plan.path is not None:
                 status[k], found[k] = Status.PATH_FOUND, 1

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from reachmap._typing import CodeArray, FloatArray, IntArray
+from reachmap._typing import BoolArray, CodeArray, FloatArray, IntArray
 from reachmap.cell.model import Cell
 from reachmap.maps import CubeMap, RunInfo, Stamp, Status, WorkspaceMap
 from reachmap.maps.records import freeze
@@ -92,7 +92,7 @@ def assemble_workspace_map(
         maps[cube.name] = _cube_map(cube, results, slice(begin, end))
         begin = end
     stitching = stitch([cube.lattice for cube in cubes])
-    tried = [(m.status != Status.NOT_ATTEMPTED).sum(-1) for m in maps.values()]
+    tried = [_count(m.status != Status.NOT_ATTEMPTED) for m in maps.values()]
 
     def percent(hit: str) -> FloatArray:
         return pooled_percent(stitching, [_hits(m, hit) for m in maps.values()], tried)
@@ -115,14 +115,18 @@ def assemble_workspace_map(
     )
 
 
-def _hits(cube: CubeMap, kind: str) -> IntArray:
+def _hits(cube: CubeMap, kind: str) -> FloatArray:
     """Frames of each point that count, among those attempted, (nz, ny, nx)."""
     hit = {
         "path": cube.status == Status.PATH_FOUND,
         "ik": cube.n_ik > 0,
         "ik_free": cube.n_ik_free > 0,
     }[kind]
-    return np.asarray((hit & (cube.status != Status.NOT_ATTEMPTED)).sum(-1))
+    return _count(hit & (cube.status != Status.NOT_ATTEMPTED))
+
+
+def _count(mask: BoolArray) -> FloatArray:
+    return np.asarray(mask.sum(axis=-1), float)
 
 
 def _cube_map(cube: CubeFrames, results: FrameResults, rows: slice) -> CubeMap:
