@@ -109,3 +109,29 @@ def _distinct(
     """Frames and the attempts of each different component they touch."""
     pairs = np.unique(np.stack([frame, component], axis=1), axis=0)
     return pairs[:, 0], np.asarray(attempts)[pairs[:, 1]]
+
+
+def path_to_frame(
+    survey: Survey, connection: Connection, frame: int
+) -> FloatArray | None:
+    """Path from the scan configuration to a frame over verified motions.
+
+    Parameters
+    ----------
+    survey : Survey
+    connection : Connection
+        Of the same survey.
+    frame : int
+
+    Returns
+    -------
+    array, shape (n, dof), or None
+        The shortest in the roadmap, not shortened further; None where the frame is
+        not connected.
+    """
+    paths = connection.roadmap.shortest_paths()
+    nodes = survey.goals_of(frame) + 1
+    lengths = paths.length_rad[nodes]
+    if not len(nodes) or not np.isfinite(lengths).any():
+        return None
+    return paths.path_to(int(nodes[np.argmin(lengths)]))

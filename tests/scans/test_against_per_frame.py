@@ -1,0 +1,74 @@
+"""The roadmap against planning from scratch, on the shipped cell."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from dense_checks import dense_free
+from scenes import scene_of
+
+from reachmap.core.simplification import shorten
+from reachmap.maps import Status
+from reachmap.sampling.frames import bin_test_frames, workspace_frames
+from reachmap.scans.bin_scan import plan_grasp
+from reachmap.scans.survey import survey_frames
+from reachmap.scans.workspace_per_frame import plan_frames
+from reachmap.scans.workspace_roadmap import connect_survey, path_to_frame
+
+SAMPLE = 300
+
+
+def replay_is_free(scene, path):
+    """Whether a path is free on the meshes at a third of the verification distance."""
+    return all(
+        dense_free(scene, a, b, margin_m=0.0)
+        for a, b in zip(path[:-1], path[1:], strict=True)
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(3600)
+def test_the_roadmap_misses_nothing_that_planning_finds():
+    """On 300 random frames, what plans reach is connected; the rest has a path."""
+    scene = scene_of("ur5-eye-in-hand", with_bin=False)
+    cell = scene.loaded.cell
+    cubes = workspace_frames(cell.workspace_scan, cell.robot.tcp.approach_axis)
+    poses = np.concatenate([c.frames.transforms().reshape(-1, 4, 4) for c in cubes])
+    survey = survey_frames(scene, poses, 0.0)
+    connection = connect_survey(scene, survey, attempts=5, seed=1)
+    reached = np.zeros(len(poses), bool)
+    reached[connection.roadmap.frames_reached()] = True
+    rows = np.random.default_rng(11).permutation(len(poses))[:SAMPLE]
+    planned = plan_frames(scene, poses[rows], rows.tolist())
+    found = planned.status == Status.PATH_FOUND
+    assert reached[rows[found]].all()
+    only_roadmap = rows[~found & reached[rows]]
+    print(f"{found.sum()} found by planning, {len(only_roadmap)} more by the roadmap")
+    for frame in only_roadmap:
+        path = path_to_frame(survey, connection, int(frame))
+        rng = np.random.default_rng(int(frame))
+        short = shorten(path, scene.motions.is_verified, tries=20, rng=rng)
+        assert replay_is_free(scene, short)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(3600)
+def test_another_seed_reaches_the_same_test_grasps():
+    """On 200 random test grasps another seed agrees but where attempts had failed."""
+    scene = scene_of("ur5-eye-in-hand")
+    other = scene_of("ur5-eye-in-hand", "seed=99")
+    cell = scene.loaded.cell
+    axis = cell.robot.tcp.approach_axis
+    grid = bin_test_frames(cell.bin_scan, cell.bin, axis, scene.T_base_bin).frames
+    rows = np.random.default_rng(12).permutation(grid.size)[:200]
+    survey = survey_frames(
+        scene, grid.transforms_at(rows), cell.bin_scan.approach_distance_m
+    )
+    disputed = 0
+    for k in range(len(rows)):
+        first = plan_grasp(scene, survey, k, connected=True)
+        second = plan_grasp(other, survey, k, connected=True)
+        if first.path_found.any() != second.path_found.any():
+            assert not first.path_found.all()
+            disputed += 1
+    print(f"{disputed} of {len(rows)} differ, all found in fewer than all attempts")
