@@ -26,6 +26,8 @@ FORMATS: dict[str, tuple[Callable[[Path], Any], Callable[[Path, Any], str]]] = {
     "bin": (read_bin_map, write_bin_map),
     "placement": (read_placement, write_placement),
 }
+# Wording may be bettered within a version; the rest of the file may not change.
+INTERNAL = {"CLASS", "NAME", "DIMENSION_LIST", "REFERENCE_LIST", "long_name"}
 CONTENT_1_0 = {
     "workspace": "c63a4be714a9201901390b908416c7b4d0e09dc07d9a09a35954523172b3515e",
     "bin": "75b84049154d833c3898b576135228c579354c7eba8f261756cc9291fe3356e0",
@@ -50,7 +52,7 @@ def flat(path: Path) -> dict[str, tuple[Any, ...]]:
         attributes = {
             key: np.asarray(value).tolist()
             for key, value in item.attrs.items()
-            if key not in ("CLASS", "NAME", "DIMENSION_LIST", "REFERENCE_LIST")
+            if key not in INTERNAL
         }
         if isinstance(item, h5py.Dataset):
             dims = [dim[0].name if len(dim) else "" for dim in item.dims]
@@ -108,6 +110,8 @@ def test_golden_files_are_written_alike_today(
     again = tmp_path / "again.h5"
     write(again, read(path))
     old, new = flat(path), flat(again)
+    for found in (old, new):
+        found["/"][3].pop("integrity_sha256")
     assert list(old) == list(new)
     for key, (value, dtype, dims, attributes) in old.items():
         assert (dtype, dims, attributes) == new[key][1:], key

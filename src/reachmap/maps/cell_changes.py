@@ -28,12 +28,17 @@ def cell_changes(
 
 
 def flat_json(value: Any, prefix: str = "") -> Iterator[tuple[str, str]]:
-    """Leaves of nested JSON as ``key.key[0]`` and JSON text."""
+    """Leaves of nested JSON as ``key.name.key`` and JSON text.
+
+    Elements of a list go by their ``name`` if they have one, else by ``[0]``, …
+    """
     if isinstance(value, Mapping):
         for key, item in value.items():
             yield from flat_json(item, f"{prefix}.{key}" if prefix else str(key))
     elif isinstance(value, list) and any(isinstance(i, dict | list) for i in value):
         for index, item in enumerate(value):
-            yield from flat_json(item, f"{prefix}[{index}]")
+            name = item.get("name") if isinstance(item, Mapping) else None
+            place = f".{name}" if isinstance(name, str) else f"[{index}]"
+            yield from flat_json(item, f"{prefix}{place}")
     else:
         yield prefix, json.dumps(value)

@@ -103,7 +103,7 @@ WORKSPACE = Layout(
     attributes={
         "method": "How paths were sought: `roadmap` or `per-frame`.",
         "joint_names": "Names of the joints, in order.",
-        "body_pairs": "Pairs of bodies, `A | B`; blocking_pair counts in this list.",
+        "body_pairs": "Names of two bodies each; blocking_pair counts in this list.",
     },
     variables=(
         coordinate("z", "Levels of the stitched lattice.", "robot_base"),
