@@ -81,6 +81,13 @@ def test_every_command_is_shown_in_use(name: str) -> None:
     assert any(re.search(rf"reachmap {name}\b|`{name}\b", text) for text in texts)
 
 
+@pytest.mark.parametrize("name", AVAILABLE)
+def test_every_tool_is_in_the_library_reference(name: str) -> None:
+    """What a command does can be called from Python, and is documented as such."""
+    text = (DOCS / "reference" / "api" / "tools.md").read_text()
+    assert f"reachmap.tools.{name.replace('-', '_')}\n" in text
+
+
 def command_lines(text: str) -> list[list[str]]:
     """Words of every line in a code block that begins with `reachmap`."""
     blocks = re.findall(r"```(?:console|sh|bash)\n(.*?)```", text, flags=re.DOTALL)
