@@ -35,7 +35,7 @@ class GraspResults:
     ----------
     status, n_ik, n_ik_free, connected : uint8 array, shape (grasps,)
     blocking_pair : int array, shape (grasps,)
-    path_found : uint8 array, shape (grasps, repeats)
+    path_found, hit_time_limit : uint8 array, shape (grasps, repeats)
     measured : array, shape (grasps, repeats, 7)
         In the order of :data:`MEASURED`.
     goal_configuration : array, shape (grasps, dof)
@@ -53,6 +53,7 @@ class GraspResults:
     connected: CodeArray
     blocking_pair: IntArray
     path_found: CodeArray
+    hit_time_limit: CodeArray
     measured: FloatArray
     goal_configuration: FloatArray
     configuration: FloatArray
@@ -73,6 +74,7 @@ class GraspResults:
             connected=np.zeros(grasps, np.uint8),
             blocking_pair=np.full(grasps, -1, np.int64),
             path_found=np.zeros((grasps, repeats), np.uint8),
+            hit_time_limit=np.zeros((grasps, repeats), np.uint8),
             measured=np.full((grasps, repeats, len(MEASURED)), np.nan),
             goal_configuration=np.full((grasps, dof), np.nan),
             configuration=np.zeros((0, dof)),
@@ -143,6 +145,7 @@ def assemble_bin_map(
         n_ik_free=shaped(results.n_ik_free),
         connected=shaped(results.connected),
         path_found=shaped(results.path_found),
+        hit_time_limit=shaped(results.hit_time_limit),
         **measured,
         goal_configuration=shaped(results.goal_configuration),
         path_reachability=percent,

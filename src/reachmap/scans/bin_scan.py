@@ -135,10 +135,12 @@ def _results(
 ) -> GraspResults:
     repeats = scene.loaded.cell.bin_scan.repeats
     measured = np.full((1, repeats, len(MEASURED)), np.nan)
+    out_of_time = np.zeros((1, repeats), np.uint8)
     paths: list[FloatArray] = []
     planned: list[int] = []
     place: list[tuple[int, int]] = []
     for repeat, plan in enumerate(plans):
+        out_of_time[0, repeat] = plan.hit_time_limit
         if plan.path is None:
             continue
         way = ways[plan.goal]
@@ -153,6 +155,7 @@ def _results(
         connected=np.array([connected], np.uint8),
         blocking_pair=survey.blocking_pair[[grasp]],
         path_found=np.isfinite(measured[..., 0]).astype(np.uint8),
+        hit_time_limit=out_of_time,
         measured=measured,
         goal_configuration=_shortest_goal(paths, measured, scene.robot.dof),
         configuration=np.vstack([np.zeros((0, scene.robot.dof)), *paths]),
