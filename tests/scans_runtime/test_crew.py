@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import random
 from collections import Counter
 from concurrent.futures import BrokenExecutor, Executor, Future
 
@@ -41,6 +42,7 @@ class Cluster:
             start=lambda: Scripted(self),
             stop=lambda executor: self.pending.clear(),
             parcel=PARCEL,
+            label=PARCEL,
             window=lambda: 4 * self.width,
             **settings,
         )
@@ -134,6 +136,31 @@ def test_a_worker_that_dies_once_loses_nothing():
     assert cluster.started == 4
 
 
+def test_workers_killed_from_outside_are_no_fault_of_the_units():
+    """Deaths all over the place raise the number that one unit is blamed for."""
+
+    class Stormy(Cluster):
+        rng = random.Random(0)
+
+        def step(self):
+            if self.pending and self.rng.random() < 0.25:
+                self.moody = {self.pending[0][1]}
+            super().step()
+
+    for _ in range(20):
+        cluster = Stormy(1)
+        assert failed(run(cluster, 100, in_order=True)) == []
+        assert max(cluster.killed.values()) >= 2
+
+
+def test_a_poisoned_unit_is_found_among_deaths_from_outside():
+    """It takes longer, and it ends."""
+    cluster = Cluster(1, poison={5}, moody=set(range(6, 30)))
+    replies = run(cluster, 40, in_order=True)
+    assert failed(replies) == [5]
+    assert cluster.killed[5] == 12
+
+
 @pytest.mark.parametrize("heals", [False, True])
 def test_a_wide_lane_blames_nobody_in_a_crowd(heals):
     """Neighbours of a poisoned unit are tried alone and found innocent."""
@@ -189,15 +216,18 @@ def test_workers_that_never_start_end_the_run():
         start=lambda: Dead(cluster),
         stop=lambda executor: None,
         parcel=PARCEL,
+        label=PARCEL,
         window=lambda: 2,
         in_order=True,
     )
     with (
-        pytest.raises(EngineError, match=r"died 5 times before their first unit.*-j 1"),
+        pytest.raises(
+            EngineError, match=r"died 20 times before their first unit.*-j 1"
+        ),
         Crew([spec]) as crew,
     ):
         list(crew.replies(range(3)))
-    assert cluster.started == 5
+    assert cluster.started == 20
 
 
 @pytest.mark.parametrize(

@@ -98,7 +98,7 @@ def test_without_dask_the_extra_is_named(tmp_path, monkeypatch):
 def test_a_worker_of_a_local_cluster_is_killed(tmp_path):
     """Two workers, one killed midway: the artefact is that of a run by processes."""
     output = tmp_path / "out.json"
-    process = start(output, "dask:local", pause_s=0.2)
+    process = start(output, "dask:local", pause_s=0.2, ballast=20_000_000)
     wait_for_units(output, 5, process)
     workers = [
         child
@@ -109,6 +109,7 @@ def test_a_worker_of_a_local_cluster_is_killed(tmp_path):
     workers[0].kill()
     code, err = finish(process)
     assert code == 0, err
+    assert "Warning" not in err
     assert json.loads(output.read_text()) == expected()
     assert not journal_path(output).exists()
 

@@ -10,6 +10,7 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from pathlib import Path
 
 import psutil
@@ -69,11 +70,20 @@ def wait_for_units(output, count, process):
 
 def workers_of(process):
     """Worker processes of a scan, without multiprocessing's own helper."""
-    return [
-        child
-        for child in psutil.Process(process.pid).children()
-        if "spawn_main" in " ".join(child.cmdline())
-    ]
+    workers = []
+    for child in children_of(process):
+        with suppress(psutil.Error):  # it may end this moment
+            if "spawn_main" in " ".join(child.cmdline()):
+                workers.append(child)
+    return workers
+
+
+def children_of(process):
+    """Child processes; none when it has ended."""
+    try:
+        return psutil.Process(process.pid).children()
+    except psutil.NoSuchProcess:
+        return []
 
 
 def wait_a_while(output, process, rng):
@@ -102,7 +112,7 @@ def kill_at_random_moments(output, count, seed):
     while deaths < count and not output.exists():
         process = start(output, "-j", "2", units=60, pause_s=0.02)
         wait_a_while(output, process, rng)
-        children = psutil.Process(process.pid).children()
+        children = children_of(process)
         process.kill()
         process.communicate()
         deaths += process.returncode == -signal.SIGKILL
@@ -162,7 +172,7 @@ def test_told_to_stop(tmp_path, number, workers):
 def test_a_worker_killed_again_and_again(tmp_path):
     """Killing a worker every quarter of a second costs time, never a unit."""
     output = tmp_path / "out.json"
-    process = start(output, "-j", "2", units=40, pause_s=0.1)
+    process = start(output, "-j", "2", units=40, pause_s=0.1, ballast=2_000_000)
     wait_for_units(output, 1, process)
     rng, killed = random.Random(7), 0
     while process.poll() is None and killed < 4:

@@ -13,7 +13,7 @@ import os
 import signal
 import sys
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -28,6 +28,7 @@ class Toy:
 
     ``poison`` units kill their worker, ``moody`` ones only the first time (``marks``
     is a folder that remembers), ``buggy`` ones raise, ``wrong`` ones find bad input.
+    ``ballast`` makes the context that large [bytes].
     """
 
     units: int = 40
@@ -39,6 +40,11 @@ class Toy:
     wrong: tuple[int, ...] = ()
     marks: str = ""
     prepare: str = "well"
+    ballast: int = 0
+    load: bytes = field(default=b"", init=False, repr=False)
+
+    def __post_init__(self):
+        object.__setattr__(self, "load", bytes(self.ballast))
 
 
 def prepare(toy):

@@ -5,6 +5,10 @@ die, the units it held are handed out again; the one that was being worked on ge
 strike, and with three strikes it is given up as an error. A lane of one process
 takes its units in order, so there is no doubt which one that was. In a lane of many
 workers there is: there the units are tried again one at a time before any is blamed.
+
+Workers may also be killed from outside, and hit the same unit more than once by
+chance. Every unit that lost a worker and was computed all the same is a sign of that,
+and allows the others one strike more.
 """
 
 from __future__ import annotations
@@ -26,10 +30,11 @@ from typing import Any
 
 from reachmap.errors import EngineError, IncompleteError, ReachmapError
 from reachmap.scans.encoding import compact
-from reachmap.scans.tasks import Parcel, Reply, compute, get_ready
+from reachmap.scans.tasks import Reply, compute, get_ready
 
 STRIKES = 3
-FAILED_STARTS = 5
+MORE_STRIKES = 9
+FAILED_STARTS = 20
 TICK_S = 0.1
 READY = -1  # stands for the unit while a worker gets ready
 
@@ -46,8 +51,12 @@ class LaneSpec:
         Makes the executor, and a new one after its workers died.
     stop : callable
         Ends an executor and its workers promptly; takes what ``start`` made.
-    parcel : Parcel
-        The job, with its contents unless the workers were given them.
+    parcel : Parcel or object
+        The job, or what the executor turns into it for the functions it calls. A new
+        executor gets it first, to get ready with.
+    label : Parcel or object
+        What goes with each unit: the parcel again, or its label where the workers
+        keep what they got ready.
     window : callable
         Number of units that may be in flight now.
     in_order : bool
@@ -59,7 +68,8 @@ class LaneSpec:
 
     start: Callable[[], Executor]
     stop: Callable[[Executor], None]
-    parcel: Parcel
+    parcel: Any
+    label: Any
     window: Callable[[], int]
     in_order: bool = False
     deaths: Callable[[BaseException], int] = lambda error: 0
@@ -93,7 +103,7 @@ class Lane:
         if self._executor is None:
             self._executor = self.spec.start()
             self.held[self._executor.submit(get_ready, self.spec.parcel)] = READY
-        self.held[self._executor.submit(compute, self.spec.parcel, unit)] = unit
+        self.held[self._executor.submit(compute, self.spec.label, unit)] = unit
 
     def let_go(self) -> list[int]:
         """End the executor; returns the units it held, in order."""
@@ -118,6 +128,7 @@ class Crew:
         self._lanes = [Lane(spec) for spec in specs]
         self._waiting: deque[int] = deque()
         self._strikes: Counter[int] = Counter()
+        self._acquitted = 0
         self._failed_starts = 0
         self._given_up: deque[Reply] = deque()
 
@@ -204,6 +215,7 @@ class Crew:
                 continue
             alone, lane.alone = lane.alone, False
             if error is None:
+                self._acquitted += unit in self._strikes
                 yield future.result()
             elif deaths := lane.spec.deaths(error):
                 self._after_deaths_of(lane, unit, deaths, alone=alone)
@@ -251,16 +263,20 @@ class Crew:
     def _strike(self, lane: Lane, unit: int, deaths: int) -> None:
         self._strikes[unit] += deaths
         count = self._strikes[unit]
-        if count >= STRIKES:
+        limit = STRIKES + min(self._acquitted, MORE_STRIKES)
+        if count >= limit:
             text = f"killed {count} workers"
             log.warning("unit %d %s and is given up", unit, text)
-            self._given_up.append(Reply(unit=unit, payload=compact(text), failed=True))
+            reply = Reply(unit=unit, payload=compact(text), failed=True)
+            self._given_up.append(reply)
             return
-        log.info("a worker died at unit %d (%d of %d)", unit, count, STRIKES)
-        if lane.spec.in_order:
-            self._waiting.appendleft(unit)
-        else:
+        log.info("a worker died at unit %d (%d of %d)", unit, count, limit)
+        if not lane.spec.in_order:
             lane.suspects.append(unit)
+        elif count == 1:
+            self._waiting.appendleft(unit)
+        else:  # judged last, when more is known about who kills workers here
+            self._waiting.append(unit)
 
 
 def _exception(future: Future[Any]) -> BaseException | None:

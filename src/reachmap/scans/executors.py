@@ -29,6 +29,7 @@ from reachmap.errors import (
 )
 from reachmap.scans.crew import LaneSpec
 from reachmap.scans.tasks import Parcel
+from reachmap.scans.work import unchanged
 from reachmap.scans.workers import in_process_lane, one_thread_each, process_lanes
 
 UNITS_PER_THREAD = 4
@@ -104,6 +105,7 @@ def lane_of(make: Callable[[], Executor], parcel: Parcel, *, workers: int) -> La
         start=make,
         stop=lambda executor: executor.shutdown(wait=False, cancel_futures=True),
         parcel=parcel,
+        label=parcel,
         window=lambda: UNITS_PER_THREAD * workers,
     )
 
@@ -111,7 +113,12 @@ def lane_of(make: Callable[[], Executor], parcel: Parcel, *, workers: int) -> La
 @contextmanager
 def _dask_client(address: str, workers: int) -> Iterator[Any]:
     distributed = _distributed()
+    import dask
+
     with ExitStack() as stack:
+        # A survey of all test grasps is large, and meant to be sent.
+        threshold = {"distributed.admin.large-graph-warning-threshold": "1 GB"}
+        stack.enter_context(dask.config.set(threshold))
         stack.enter_context(distributed.utils.silence_logging_cmgr(_dask_log_level()))
         if address == "local":
             address = stack.enter_context(_local_cluster(workers)).scheduler_address
@@ -166,11 +173,15 @@ def _distributed() -> Any:
 
 
 def _dask_lane(client: Any, parcel: Parcel) -> LaneSpec:
+    # As a task's result the job goes to each worker once, also to those that come
+    # later, and it is made again when the workers that had it die.
+    sent = client.submit(unchanged, parcel, pure=False)
     return LaneSpec(
         # Not pure: a unit that is tried again must be computed again.
         start=lambda: client.get_executor(pure=False),
         stop=lambda executor: executor.shutdown(wait=False),
-        parcel=parcel,
+        parcel=sent,
+        label=sent,
         window=_Window(client),
         deaths=_dask_deaths,
     )

@@ -44,7 +44,7 @@ class Job:
 class Parcel:
     """A job under the key of its run.
 
-    ``job`` is None when the worker has been given it before.
+    ``job`` is None when the worker has got ready for it before.
     """
 
     key: str
@@ -71,7 +71,6 @@ class _Prepared:
     state: Any
 
 
-_delivered: dict[str, Job] = {}
 _prepared: OrderedDict[str, _Prepared] = OrderedDict()
 # One unit at a time per process: models and scenes are not made for threads, which
 # a Dask worker may have several of.
@@ -100,12 +99,6 @@ def parcel_from_work(work: Work) -> Parcel:
         packages=package_versions(),
     )
     return Parcel(key=secrets.token_hex(16), job=job)
-
-
-def deliver(parcel: Parcel) -> None:
-    """Keep a parcel's contents, so that its label is enough from here on."""
-    if parcel.job is not None:
-        _delivered[parcel.key] = parcel.job
 
 
 def get_ready(parcel: Parcel) -> int:
@@ -162,7 +155,8 @@ def forget(parcel: Parcel) -> None:
 
 def _prepared_for(parcel: Parcel) -> _Prepared:
     if parcel.key not in _prepared:
-        job = parcel.job or _delivered[parcel.key]
+        if (job := parcel.job) is None:
+            raise EngineError("a worker was not told what to do")
         _check_packages(job.packages)
         _prepared[parcel.key] = _Prepared(job=job, state=job.prepare(job.context))
         while len(_prepared) > KEPT_JOBS:

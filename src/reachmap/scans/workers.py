@@ -17,7 +17,7 @@ from multiprocessing.connection import Connection
 from typing import ParamSpec, TypeVar
 
 from reachmap.scans.crew import LaneSpec
-from reachmap.scans.tasks import Parcel, deliver, forget
+from reachmap.scans.tasks import Parcel, forget
 
 THREAD_VARIABLES = (
     "OMP_NUM_THREADS",
@@ -50,7 +50,7 @@ class InProcess(Executor):
 class WorkerProcess(ProcessPoolExecutor):
     """A pool of one process that is stopped at once, and does not outlive this one."""
 
-    def __init__(self, parcel: Parcel) -> None:
+    def __init__(self) -> None:
         spawn = multiprocessing.get_context("spawn")
         # The worker holds the reading end of a pipe and leaves when the other end is
         # closed, which also happens when this process is killed.
@@ -59,7 +59,9 @@ class WorkerProcess(ProcessPoolExecutor):
             max_workers=1,
             mp_context=spawn,
             initializer=_begin,
-            initargs=(self._reader, parcel),
+            # Nothing large: a worker that dies before it has read what it is started
+            # with would leave this process writing for ever.
+            initargs=(self._reader,),
         )
 
     def end(self) -> None:
@@ -77,6 +79,7 @@ def in_process_lane(parcel: Parcel) -> LaneSpec:
         start=InProcess,
         stop=lambda executor: forget(parcel),
         parcel=parcel,
+        label=parcel,
         window=lambda: 1,
         in_order=True,
     )
@@ -86,9 +89,10 @@ def process_lanes(parcel: Parcel, workers: int) -> list[LaneSpec]:
     """One lane per worker process."""
     return [
         LaneSpec(
-            start=lambda: WorkerProcess(parcel),
+            start=WorkerProcess,
             stop=_end,
-            parcel=parcel.label(),
+            parcel=parcel,
+            label=parcel.label(),
             window=lambda: WINDOW,
             in_order=True,
         )
@@ -116,10 +120,9 @@ def _end(executor: Executor) -> None:
         executor.end()
 
 
-def _begin(lifeline: Connection, parcel: Parcel) -> None:
+def _begin(lifeline: Connection) -> None:
     """Begin a worker: leave Ctrl-C to the parent, and do not outlive it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    deliver(parcel)
     threading.Thread(target=_leave_with, args=(lifeline,), daemon=True).start()
 
 
