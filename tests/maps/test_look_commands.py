@@ -16,6 +16,7 @@ from synthetic_maps import (
 
 from reachmap.cli import group
 from reachmap.maps import write_bin_map, write_placement, write_workspace_map
+from reachmap.plots import files, style
 
 
 def run(*words: Any) -> Result:
@@ -222,8 +223,11 @@ def test_compare_refuses(folder: Path, a: str, b: str, message: str) -> None:
     assert answer.stderr.count("\n") == 1
 
 
-def test_compare_draws(folder: Path, tmp_path: Path) -> None:
-    """One file by name; existing ones are kept without --overwrite."""
+def test_compare_draws(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One file by name, or a folder; existing files are kept without --overwrite."""
+    monkeypatch.setattr(style, "DPI", 40)
     words = ("compare", folder / "workspace.h5", folder / "better.h5", "--picture")
     picture = tmp_path / "change.png"
     assert run(*words, picture).exit_code == 0
@@ -231,4 +235,23 @@ def test_compare_draws(folder: Path, tmp_path: Path) -> None:
     again = run(*words, picture)
     assert again.exit_code == 2
     assert "exists already" in again.stderr
-    assert run(*words, picture, "--overwrite").exit_code == 0
+
+
+def test_the_album_of_a_comparison_goes_to_a_folder(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A path without .png or .svg is a folder; names are those of the album."""
+    written: list[tuple[Path, list[str]]] = []
+
+    def note(target: Path, items: list[Any], **_: Any) -> tuple[Path, ...]:
+        written.append((target, [item.name for item in items]))
+        return ()
+
+    monkeypatch.setattr(files, "write_all", note)
+    words = ("compare", folder / "workspace.h5", folder / "better.h5", "--picture")
+    assert run(*words, tmp_path / "pictures").exit_code == 0
+    assert run(*words, tmp_path / "one.svg").exit_code == 0
+    assert written == [
+        (tmp_path / "pictures", ["comparison", "comparison_overview"]),
+        (tmp_path, ["one"]),
+    ]

@@ -17,15 +17,24 @@ from synthetic_maps import (
 from reachmap.errors import MapFileError
 from reachmap.maps import (
     artefact_kind,
+    probe,
     read_bin_map,
     read_placement,
     read_provenance,
     read_workspace_map,
+    storage,
     write_bin_map,
     write_placement,
     write_workspace_map,
 )
 from reachmap.maps.seal import SEAL_BYTES
+
+
+@pytest.fixture(autouse=True)
+def _inspect_here(monkeypatch: pytest.MonkeyPatch, request: Any) -> None:
+    """Files without a seal are tried out in this process, which is quicker."""
+    if "elsewhere" not in request.node.name:
+        monkeypatch.setattr(storage, "reason_against", probe.inspect)
 
 
 @pytest.fixture
@@ -146,7 +155,7 @@ def test_missing_variables_are_noticed(bin_file: Path) -> None:
     assert "content_sha256" in error_of(read_bin_map, bin_file)
 
 
-def test_a_file_that_was_only_opened_for_writing_is_still_read(bin_file: Path) -> None:
+def test_a_file_opened_for_writing_is_tried_elsewhere_and_read(bin_file: Path) -> None:
     """HDF5 cuts the seal off; the hash over the contents then stands for it."""
     size = bin_file.stat().st_size
     with h5py.File(bin_file, "r+"):
@@ -179,6 +188,15 @@ def test_absurd_sizes_are_refused_before_memory_is_taken(placement_file: Path) -
     with h5py.File(placement_file, "r+") as file:
         file.create_dataset("extra", shape=(2**37,), dtype="f8", chunks=(2**20,))
     assert "extra lacks data" in error_of(read_placement, placement_file)
+
+
+def test_what_was_found_elsewhere_is_said(placement_file: Path) -> None:
+    """The other process gives its reason."""
+    with h5py.File(placement_file, "r+") as file:
+        file["extra"] = h5py.SoftLink("/score")
+    assert "extra is a link to another place" in error_of(
+        read_placement, placement_file
+    )
 
 
 def test_circles_of_groups_are_refused(placement_file: Path) -> None:

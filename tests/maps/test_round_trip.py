@@ -32,7 +32,7 @@ from reachmap.maps import (
 )
 
 PROPERTY = settings(
-    max_examples=8,
+    max_examples=6,
     deadline=None,
     suppress_health_check=[HealthCheck.function_scoped_fixture],
 )

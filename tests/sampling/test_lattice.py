@@ -39,7 +39,7 @@ def test_level_zero_is_exactly_zero() -> None:
     assert not np.signbit(levels[4])
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=100, deadline=None)
 @given(
     low=st.integers(-200, 200),
     steps=st.integers(0, 60),

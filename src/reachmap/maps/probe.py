@@ -34,18 +34,23 @@ def reason_against(image: bytes) -> str:
     return done.stdout.decode(errors="replace").strip() or "HDF5 cannot read it"
 
 
-def main() -> int:
-    """Read an image from standard input; 0 if that went well, else the reason."""
-    image = sys.stdin.buffer.read()
+def inspect(image: bytes) -> str:
+    """Read an image here and now; say what is wrong with it, "" if nothing is."""
     try:
         identity = identity_from_image(image)
         # Of a file of another program, nothing more will be read.
         if layout_of(identity.get("format")) is not None:
             tree_from_image(image)
     except StructureError as error:
-        sys.stdout.write(str(error))
-        return 1
-    return 0
+        return str(error)
+    return ""
+
+
+def main() -> int:
+    """Inspect the image on standard input, write the reason against it, if any."""
+    reason = inspect(sys.stdin.buffer.read())
+    sys.stdout.write(reason)
+    return 1 if reason else 0
 
 
 if __name__ == "__main__":
