@@ -8,7 +8,8 @@ import pytest
 
 from reachmap.errors import EngineError, IncompleteError, SceneError
 from reachmap.scans import crew as crew_module
-from reachmap.scans.crew import Crew, LaneSpec
+from reachmap.scans.crew import Crew
+from reachmap.scans.lanes import LaneSpec
 from reachmap.scans.tasks import Parcel, Reply, get_ready
 
 PARCEL = Parcel(key="run", job=None)

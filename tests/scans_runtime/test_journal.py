@@ -8,6 +8,7 @@ import pytest
 
 from reachmap.errors import IncompleteError, MapFileError, OutputError
 from reachmap.scans import journal as journal_module
+from reachmap.scans import lock as lock_module
 from reachmap.scans.journal import Journal, journal_path, open_journal
 from reachmap.scans.journal_entries import Entries, read_journal
 from reachmap.scans.journal_format import Header, Measure, seal
@@ -233,7 +234,7 @@ def test_a_second_run_is_refused_while_the_first_writes(path):
 def test_a_journal_removed_while_waiting_for_its_lock_is_made_anew(path, monkeypatch):
     """The lock of a file that was just unlinked by its owner is worth nothing."""
     fill(path, [0])
-    lock, removed = journal_module._lock, []
+    lock, removed = lock_module._lock, []
 
     def lock_late(where, descriptor):
         if not removed:
@@ -241,7 +242,7 @@ def test_a_journal_removed_while_waiting_for_its_lock_is_made_anew(path, monkeyp
             where.unlink()
         lock(where, descriptor)
 
-    monkeypatch.setattr(journal_module, "_lock", lock_late)
+    monkeypatch.setattr(lock_module, "_lock", lock_late)
     with open_journal(path, header()) as journal:
         assert not journal.entries.results
         journal.append(1, payload(1))
@@ -254,7 +255,7 @@ def test_a_file_system_without_locks_is_warned_about(path, monkeypatch, caplog):
     def no_locks(descriptor, how):
         raise OSError(errno.ENOLCK, "No locks available")
 
-    monkeypatch.setattr(journal_module.fcntl, "flock", no_locks)
+    monkeypatch.setattr(lock_module.fcntl, "flock", no_locks)
     fill(path, [0])
     assert "no locks" in caplog.text
 

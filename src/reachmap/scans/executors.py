@@ -27,7 +27,7 @@ from reachmap.errors import (
     OutputError,
     SettingsError,
 )
-from reachmap.scans.crew import LaneSpec
+from reachmap.scans.lanes import LaneSpec
 from reachmap.scans.tasks import Parcel
 from reachmap.scans.work import unchanged
 from reachmap.scans.workers import in_process_lane, one_thread_each, process_lanes

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import errno
-import fcntl
 import logging
 import os
 import time
@@ -22,11 +21,11 @@ from reachmap.scans.journal_format import (
     record_from_line,
     record_line,
 )
+from reachmap.scans.lock import open_locked
 
 SYNC_INTERVAL_S = 1.0
 SHOWN_DIFFERENCES = 8
 NO_ROOM = frozenset({errno.ENOSPC, errno.EFBIG, errno.EDQUOT})
-NO_LOCKS = frozenset({errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOSYS})
 
 log = logging.getLogger(__name__)
 
@@ -186,7 +185,7 @@ def open_journal(
     MapFileError
         When it belongs to other settings, or is not a journal.
     """
-    descriptor = _open_locked(path)
+    descriptor = open_locked(path)
     try:
         entries = _prepared(path, descriptor, header, restart=restart)
         journal = Journal(path, descriptor, entries, sync_interval_s=sync_interval_s)
@@ -199,39 +198,6 @@ def open_journal(
         journal.sync()
     finally:
         os.close(descriptor)
-
-
-def _open_locked(path: Path) -> int:
-    while True:
-        try:
-            descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
-        except OSError as error:
-            raise OutputError(f"{path}: {error.strerror}") from error
-        try:
-            _lock(path, descriptor)
-            # The run that held the lock may just have removed the file.
-            if os.path.samestat(os.fstat(descriptor), path.stat()):
-                return descriptor
-        except FileNotFoundError:
-            pass
-        except BaseException:
-            os.close(descriptor)
-            raise
-        os.close(descriptor)
-
-
-def _lock(path: Path, descriptor: int) -> None:
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        raise OutputError(
-            f"{path} is being written by another run: wait for it, or choose "
-            "another output"
-        ) from None
-    except OSError as error:
-        if error.errno not in NO_LOCKS:
-            raise OutputError(f"{path}: {error.strerror}") from error
-        log.warning("%s: this file system has no locks; run one scan at a time", path)
 
 
 def _prepared(path: Path, descriptor: int, header: Header, *, restart: bool) -> Entries:

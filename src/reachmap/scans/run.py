@@ -15,7 +15,7 @@ import logging
 import shlex
 import sys
 from collections.abc import Iterator
-from contextlib import ExitStack, closing, contextmanager
+from contextlib import ExitStack, closing, contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -33,7 +33,7 @@ from reachmap.scans.journal_format import Header
 from reachmap.scans.progress import Progress
 from reachmap.scans.results import Results, last_line
 from reachmap.scans.signals import Interrupted, StopRequest, stop_signals
-from reachmap.scans.tasks import package_versions, parcel_from_work
+from reachmap.scans.tasks import Reply, package_versions, parcel_from_work
 from reachmap.scans.work import Work
 
 log = logging.getLogger(__name__)
@@ -173,23 +173,20 @@ def run_units(
         As for :func:`run_scan`.
     """
     check_executor(executor)
-    # One unit at a time in this process: nobody is there to look after the clock or
-    # a signal while it is computed.
-    alone = executor == "processes" and workers == 1
     with (
         open_journal(
             journal_path(output, shard),
             header_of(work, shard),
             restart=restart,
-            sync_interval_s=0.0 if alone else SYNC_INTERVAL_S,
+            # Nobody looks at the clock while this process computes a unit.
+            sync_interval_s=0.0 if _is_alone(executor, workers) else SYNC_INTERVAL_S,
         ) as journal,
-        stop_signals(at_once=alone) as stop,
+        stop_signals() as stop,
     ):
         resumed = len(journal.entries.results)
         progress = progress or Progress("", quiet=True)
         try:
             _compute_missing(work, journal, workers, executor, progress, stop)
-            stop.at_once = True
             results = Results(work.kind, [journal.entries], resumed=resumed)
             yield results
         except KeyboardInterrupt:
@@ -234,30 +231,40 @@ def _compute_missing(
         done=sum(measure.frames for measure in before),
         ok=sum(measure.ok for measure in before),
     )
-    if not todo:
+    try:
+        if todo:
+            with (
+                open_lanes(executor, workers, parcel_from_work(work)) as lanes,
+                Crew(lanes) as crew,
+                # A unit in this process is broken off; others are let to arrive.
+                nullcontext() if _is_alone(executor, workers) else stop.deferred(),
+                closing(crew.replies(todo)) as replies,
+            ):
+                for reply in replies:
+                    if reply is None:
+                        stop.check()
+                        journal.sync_if_due()
+                        progress.tick()
+                    else:
+                        _record(work, reply, journal, progress)
+    finally:
         progress.end()
-        return
-    with (
-        open_lanes(executor, workers, parcel_from_work(work)) as lanes,
-        Crew(lanes) as crew,
-        closing(crew.replies(todo)) as replies,
-    ):
-        for reply in replies:
-            stop.check()
-            if reply is None:
-                journal.sync_if_due()
-                progress.tick()
-                continue
-            journal.append(
-                reply.unit, reply.payload, failed=reply.failed, measure=reply.measure
-            )
-            if reply.failed:
-                text = json.loads(reply.payload)
-                log.warning("unit %d failed: %s", reply.unit, last_line(text))
-                log.debug("%s", text)
-            frames = reply.measure.frames or work.total_frames // work.units
-            progress.add(frames, reply.measure.ok)
-    progress.end()
+
+
+def _record(work: Work, reply: Reply, journal: Journal, progress: Progress) -> None:
+    journal.append(
+        reply.unit, reply.payload, failed=reply.failed, measure=reply.measure
+    )
+    if reply.failed:
+        text = json.loads(reply.payload)
+        log.warning("unit %d failed: %s", reply.unit, last_line(text))
+        log.debug("%s", text)
+    frames = reply.measure.frames or work.total_frames // work.units
+    progress.add(frames, reply.measure.ok)
+
+
+def _is_alone(executor: str, workers: int) -> bool:
+    return executor == "processes" and workers == 1
 
 
 def _own_frames(work: Work, header: Header) -> int:

@@ -18,16 +18,22 @@ class Interrupted(KeyboardInterrupt):
 class StopRequest:
     """Whether a signal has asked the run to stop.
 
-    Parameters
-    ----------
-    at_once : bool
-        Raise KeyboardInterrupt inside the handler, wherever the program is, instead
-        of leaving it to :meth:`check`. A second signal always does.
+    A signal raises KeyboardInterrupt wherever the program is, but within
+    :meth:`deferred` it waits for :meth:`check`. A second one waits for nothing.
     """
 
-    def __init__(self, *, at_once: bool) -> None:
-        self.at_once = at_once
+    def __init__(self) -> None:
         self.requested = False
+        self._deferred = False
+
+    @contextmanager
+    def deferred(self) -> Iterator[None]:
+        """Let a signal wait for :meth:`check`."""
+        self._deferred = True
+        try:
+            yield
+        finally:
+            self._deferred = False
 
     def check(self) -> None:
         """Raise KeyboardInterrupt when a signal has come."""
@@ -37,20 +43,14 @@ class StopRequest:
     def handle(self, number: int, frame: FrameType | None) -> None:
         """Take a signal; for ``signal.signal``."""
         again, self.requested = self.requested, True
-        if self.at_once or again:
+        if again or not self._deferred:
             raise KeyboardInterrupt
 
 
 @contextmanager
-def stop_signals(*, at_once: bool) -> Iterator[StopRequest]:
-    """Catch the signals that end a run; outside the main thread, catch none.
-
-    Parameters
-    ----------
-    at_once : bool
-        See :class:`StopRequest`.
-    """
-    request = StopRequest(at_once=at_once)
+def stop_signals() -> Iterator[StopRequest]:
+    """Catch the signals that end a run; outside the main thread, catch none."""
+    request = StopRequest()
     if threading.current_thread() is not threading.main_thread():
         yield request
         return

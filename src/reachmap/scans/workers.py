@@ -16,7 +16,7 @@ from contextlib import contextmanager
 from multiprocessing.connection import Connection
 from typing import ParamSpec, TypeVar
 
-from reachmap.scans.crew import LaneSpec
+from reachmap.scans.lanes import LaneSpec
 from reachmap.scans.tasks import Parcel, forget
 
 THREAD_VARIABLES = (
