@@ -121,3 +121,9 @@ def test_twice_is_the_same_to_the_bit() -> None:
         orientation_set(ConeFamily()).tobytes()
         == orientation_set(ConeFamily()).tobytes()
     )
+
+
+def test_a_ring_without_tilt_has_one_direction() -> None:
+    """Eight azimuths of straight down would be one frame counted eight times."""
+    with pytest.raises(ValueError, match="tilt 0 has one direction"):
+        ConeFamily(tilts_deg=(0, 30), azimuths=(8, 8))

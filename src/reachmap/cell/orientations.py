@@ -54,6 +54,12 @@ class ConeFamily(Record):
                 "tilts_deg and azimuths must have the same length "
                 f"(got {len(self.tilts_deg)} and {len(self.azimuths)})"
             )
+        for tilt, count in zip(self.tilts_deg, self.azimuths, strict=True):
+            if tilt == 0 and count > 1:
+                raise ValueError(
+                    f"a ring with tilt 0 has one direction, straight down (got {count} "
+                    "azimuths)"
+                )
         return self
 
     def count(self) -> int:
