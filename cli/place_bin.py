@@ -3,19 +3,81 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from reachmap.cli.answers import facts_text
 from reachmap.cli.options import (
     INPUT_FILE,
+    OUTPUT_PATH,
+    compose,
+    executor_option,
     json_option,
     output_option,
     overwrite_option,
+    progress_option,
     seed_option,
     set_option,
     workers_option,
+)
+
+if TYPE_CHECKING:
+    from reachmap.maps import BinPlacement
+
+AXES = ("x", "y", "z", "yaw")
+
+
+def parse_fixed(
+    ctx: click.Context, parameter: click.Parameter, values: tuple[str, ...]
+) -> dict[str, float]:
+    """Turn ``z=0`` into {"z": 0.0}."""
+    fixed: dict[str, float] = {}
+    for value in values:
+        name, equals, number = value.partition("=")
+        try:
+            fixed[name.strip()] = float(number)
+        except ValueError:
+            equals = ""
+        if not equals or name.strip() not in AXES:
+            raise click.BadParameter(
+                f"{value!r} is not NAME=NUMBER with NAME one of {', '.join(AXES)}, "
+                "such as z=0 (metres) or yaw=90 (degrees)."
+            )
+    return fixed
+
+
+region_options = compose(
+    click.option(
+        "--fix",
+        "fixed",
+        multiple=True,
+        callback=parse_fixed,
+        metavar="NAME=VALUE",
+        help="Keep x, y or z [m] or yaw [deg] at a value, as in z=0. Repeatable.",
+    ),
+    click.option(
+        "--region",
+        nargs=4,
+        type=float,
+        metavar="X0 X1 Y0 Y1",
+        help="Keep the bin's centre in this rectangle [m].",
+    ),
+    click.option(
+        "--heights",
+        nargs=2,
+        type=float,
+        metavar="Z0 Z1",
+        help="Keep the inner bottom between these heights [m].",
+    ),
+    click.option(
+        "--bin-pose",
+        nargs=4,
+        type=float,
+        metavar="X Y Z YAW",
+        help="Score this pose [m, m, m, deg] instead of searching for one.",
+    ),
 )
 
 
@@ -25,44 +87,139 @@ from reachmap.cli.options import (
 )
 @click.option(
     "--rule",
-    type=click.Choice(["paper"]),
-    default="paper",
+    type=click.Choice(["search", "paper"]),
+    default="search",
     show_default=True,
-    help="paper takes the best level and the 100 % point in its densest patch.",
+    help="search looks for the best of all poses; paper takes the best level and the "
+    "100 % point in its densest patch.",
+)
+@region_options
+@click.option(
+    "--top",
+    type=click.IntRange(min=1, max=100),
+    default=5,
+    show_default=True,
+    metavar="N",
+    help="Different places to map with the bin in the scene, and rows to print.",
+)
+@click.option(
+    "--keep-scan-configuration",
+    is_flag=True,
+    help="Leave the cell's own scan configuration.",
+)
+@click.option(
+    "--picture",
+    type=OUTPUT_PATH,
+    metavar="PATH",
+    help="Draw the decision there, too: .png or .svg.",
 )
 @output_option("placement.h5")
 @set_option
 @seed_option
 @workers_option
+@executor_option
 @overwrite_option
+@progress_option
 @json_option
 def command(
     workspace: Path,
     rule: str,
+    fixed: dict[str, float],
+    region: tuple[float, float, float, float] | None,
+    heights: tuple[float, float] | None,
+    bin_pose: tuple[float, float, float, float] | None,
+    top: int,
+    keep_scan_configuration: bool,
+    picture: Path | None,
     output: Path,
     overrides: tuple[str, ...],
     seed: int | None,
     workers: int,
+    executor: str,
     overwrite: bool,
+    progress: bool,
     as_json: bool,
 ) -> None:
     """Find where the bin should stand, and its scan configuration.
 
-    WORKSPACE is what workspace-scan wrote; by default workspace.h5 in this folder. The
-    result holds the cell with its new bin pose, so that bin-scan needs nothing else.
+    WORKSPACE is what workspace-scan wrote; by default workspace.h5 in this folder.
+    Poses are scored on the map; the best are mapped again with the bin in the scene.
+    The result holds the cell with its new bin pose and scan configuration, so that
+    bin-scan needs nothing else. The margin is how far the bin may be off before the
+    score drops by 5 points.
 
-    Example: reachmap place-bin workspace.h5 --rule paper
+    Example: reachmap place-bin workspace.h5 --fix z=0 --region 0.2 0.8 -0.5 0.5
     """
     from reachmap.tools.options import RunOptions
-    from reachmap.tools.place_bin import place_bin, summary_of_placement
+    from reachmap.tools.place_bin import PlacementChoice, place_bin, placement_facts
 
+    limits = {} if region is None else {"x": region[:2], "y": region[2:]}
     placement = place_bin(
         workspace,
         output,
-        rule=rule,
+        choice=PlacementChoice(
+            rule=rule,
+            bin_pose=bin_pose,
+            limits=limits | ({} if heights is None else {"z": heights}),
+            fixed=fixed,
+            top=top,
+            keep_scan_configuration=keep_scan_configuration,
+        ),
         overrides=overrides,
         seed=seed,
-        run=RunOptions(workers=workers, overwrite=overwrite),
+        picture=picture,
+        run=RunOptions(
+            workers=workers,
+            executor=executor,
+            overwrite=overwrite,
+            quiet=not progress,
+        ),
     )
-    facts = {"output": str(output)} | summary_of_placement(placement)
-    click.echo(json.dumps(facts) if as_json else facts_text(facts))
+    if as_json:
+        click.echo(json.dumps({"output": str(output)} | placement_facts(placement)))
+    else:
+        for line in _lines(placement, output, top):
+            click.echo(line)
+
+
+def _lines(placement: BinPlacement, output: Path, top: int) -> Iterator[str]:
+    """Lay the decision out for people."""
+    from reachmap.tools.place_bin import best_rows, placement_facts, row_facts
+
+    roles = {
+        placement.paper_choice: "paper's rule",
+        placement.runner_up: "runner-up",
+        placement.chosen: "chosen",
+    }
+    rows = best_rows(placement, top)
+    rows += [k for k in (placement.runner_up, placement.paper_choice) if k not in rows]
+    yield "      x       y       z   yaw   score   worst  reachable"
+    for row in rows:
+        facts = row_facts(placement, row)
+        if facts is not None:
+            yield _row_text(facts, roles.get(row, ""))
+    facts = placement_facts(placement)
+    if placement.margin:
+        yield "margin (score within 5 points): " + _margin_text(facts)
+    yield (
+        f"{facts['candidates']} poses considered, {facts['mapped_with_bin']} mapped "
+        f"with the bin in the scene, {facts['excluded']} excluded"
+    )
+    yield str(output)
+
+
+def _row_text(facts: dict[str, Any], role: str) -> str:
+    x, y, z = facts["xyz_m"]
+    pose = f"{x:+7.3f} {y:+7.3f} {z:+7.3f} {facts['yaw_deg']:4.0f}°"
+    if facts["score_percent"] is None:
+        return f"{pose}  {facts.get('reason', '')}  {role}".rstrip()
+    return (
+        f"{pose} {facts['score_percent']:6.1f}% {facts['worst_point_percent']:6.1f}% "
+        f"{facts['reachable_percent']:8.1f}%  {role}"
+    ).rstrip()
+
+
+def _margin_text(facts: dict[str, Any]) -> str:
+    shifts = [f"{k} {1000 * v:.0f} mm" for k, v in facts["margin_m"].items()]
+    turns = [f"{k} {v:.0f}°" for k, v in facts["margin_deg"].items()]
+    return ", ".join([*shifts, *turns])

@@ -48,9 +48,7 @@ class Region:
 
 def region_of(
     spec: PlacementSpec,
-    x: FloatArray,
-    y: FloatArray,
-    z: FloatArray,
+    lattice: Mapping[str, FloatArray],
     *,
     limits: Mapping[str, tuple[float, float]] | None = None,
     fixed: Mapping[str, float] | None = None,
@@ -60,8 +58,8 @@ def region_of(
     Parameters
     ----------
     spec : PlacementSpec
-    x, y, z : array
-        Lattice of the map, z shifted to the inner bottom [m].
+    lattice : mapping
+        ``x``, ``y``, ``z`` to what the map covers, for what the cell leaves open [m].
     limits : mapping, optional
         ``x``, ``y``, ``z`` to (low, high) [m], from the user.
     fixed : mapping, optional
@@ -73,7 +71,6 @@ def region_of(
         Nothing is left of a range.
     """
     yaw = np.radians(spec.yaw_deg)
-    lattice = {"x": x, "y": y, "z": z}
     ranges: dict[str, tuple[float, float]] = {
         name: getattr(spec, name) or (float(values.min()), float(values.max()))
         for name, values in lattice.items()

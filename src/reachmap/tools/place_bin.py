@@ -2,54 +2,105 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from reachmap._typing import FloatArray
 from reachmap.core.bin_fit import BinFit
 from reachmap.core.scene import Scene
-from reachmap.errors import SceneError
+from reachmap.core.sight import Camera
+from reachmap.errors import SettingsError
 from reachmap.geometry import yaw_transform
 from reachmap.maps import (
     BinPlacement,
     RunClock,
     WorkspaceMap,
     check_output,
+    publish,
     read_workspace_map,
     write_placement,
 )
-from reachmap.maps.records import Provenance, Stamp
-from reachmap.placement.candidates import Candidate, CandidateTable
-from reachmap.placement.exact import score_cell
-from reachmap.placement.paper_rule import LatticePoint, choose_by_paper
-from reachmap.placement.region import Region, region_of
+from reachmap.maps.records import Stamp
+from reachmap.placement.decision import (
+    Decision,
+    Question,
+    decide_as_given,
+    decide_by_paper,
+    decide_by_search,
+)
+from reachmap.placement.evaluator import Evaluator, open_evaluator
+from reachmap.placement.exact import Pose
+from reachmap.placement.outcome import Outcome, settle
+from reachmap.placement.region import AXES, Region, region_of
+from reachmap.placement.settings import placement_settings
+from reachmap.placement.summary import best_rows, placement_facts, row_facts
+from reachmap.placement.viewpoints import picture_corners
 from reachmap.scans.document import (
     checking_settings,
     provenance_from_document,
     roadmap_settings,
     scan_document,
 )
+from reachmap.scans.progress import Progress
 from reachmap.tools.options import IN_PROCESS, RunOptions, cell_of_artefact, with_seed
 
 if TYPE_CHECKING:
     from reachmap.cell.loading import LoadedCell
 
-RULES = ("paper",)
+__all__ = [
+    "PlacementChoice",
+    "best_rows",
+    "place_bin",
+    "placement_facts",
+    "row_facts",
+]
+
+RULES = ("search", "paper")
+PICTURES = (".png", ".svg")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlacementChoice:
+    """How the bin is placed.
+
+    Attributes
+    ----------
+    rule : {"search", "paper"}
+    bin_pose : tuple of float, optional
+        x, y, z [m], yaw [deg]: scored instead of searching.
+    limits : mapping
+        ``x``, ``y``, ``z`` to (low, high) [m], inside the cell's own limits.
+    fixed : mapping
+        ``x``, ``y``, ``z`` [m] or ``yaw`` [deg] to a value.
+    top : int
+        Different places that are mapped with the bin in the scene.
+    keep_scan_configuration : bool
+        Leave the cell's own.
+    """
+
+    rule: str = "search"
+    bin_pose: tuple[float, float, float, float] | None = None
+    limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    fixed: Mapping[str, float] = field(default_factory=dict)
+    top: int = 5
+    keep_scan_configuration: bool = False
 
 
 def place_bin(
     workspace: Path,
     output: Path,
     *,
-    rule: str = "paper",
+    choice: PlacementChoice | None = None,
     overrides: Sequence[str] = (),
     seed: int | None = None,
+    picture: Path | None = None,
     run: RunOptions = IN_PROCESS,
 ) -> BinPlacement:
-    """Choose where the bin stands.
+    """Choose where the bin stands, and the configuration it is imaged from.
 
     Parameters
     ----------
@@ -57,10 +108,12 @@ def place_bin(
         Artefact of workspace-scan, which holds the cell.
     output : Path
         The artefact to write.
-    rule : {"paper"}
+    choice : PlacementChoice, optional
     overrides : sequence of str
         ``key.path=value``.
     seed : int, optional
+    picture : Path, optional
+        Also draw the placement there; the suffix, .png or .svg, says how.
     run : RunOptions
 
     Returns
@@ -73,94 +126,117 @@ def place_bin(
     ReachmapError
         See :mod:`reachmap.errors`.
     """
-    check_output(output, overwrite=run.overwrite)
+    choice = choice or PlacementChoice()
+    _check(choice, output, picture, run)
     clock = RunClock(workers=run.workers)
     workspace_map = read_workspace_map(workspace)
     loaded = cell_of_artefact(
         workspace_map.provenance, str(workspace), with_seed(overrides, seed)
     )
-    with clock.phase("place"):
-        placement = _place_by_paper(loaded, workspace_map, clock)
+    region = _region(loaded, workspace_map, choice)
+    with open_evaluator(
+        loaded,
+        workers=run.workers,
+        executor=run.executor,
+        progress=Progress("place-bin", quiet=run.quiet),
+    ) as evaluator:
+        question = _question(loaded, workspace_map, region, evaluator)
+        with clock.phase("decide"):
+            decision = _decide(question, choice)
+        with clock.phase("settle"):
+            outcome = settle(
+                question,
+                decision,
+                keep_scan=choice.keep_scan_configuration,
+                tries=5 if choice.rule == "search" and not choice.bin_pose else 1,
+            )
+        clock.add_cpu("workers", evaluator.cpu_s if run.workers > 1 else 0.0)
+    placement = _record(question, decision, outcome, choice, clock)
     write_placement(output, placement, overwrite=run.overwrite)
+    if picture is not None:
+        _draw(picture, placement, workspace_map, question, run)
     return placement
 
 
-def _place_by_paper(
-    loaded: LoadedCell, workspace: WorkspaceMap, clock: RunClock
-) -> BinPlacement:
+def _check(
+    choice: PlacementChoice, output: Path, picture: Path | None, run: RunOptions
+) -> None:
+    """Refuse wrong settings before the work is done."""
+    if choice.rule not in RULES:
+        raise SettingsError(f"rule {choice.rule!r}: expected {' or '.join(RULES)}")
+    if choice.top < 1:
+        raise SettingsError(f"top {choice.top}: expected at least 1")
+    unknown = sorted(set(choice.fixed) - set(AXES))
+    if unknown:
+        raise SettingsError(f"--fix {unknown[0]}: expected one of {', '.join(AXES)}")
+    check_output(output, overwrite=run.overwrite)
+    if picture is not None:
+        if picture.suffix not in PICTURES:
+            raise SettingsError(
+                f"--picture {picture}: expected a name that ends in .png or .svg"
+            )
+        check_output(picture, overwrite=run.overwrite)
+
+
+def _region(
+    loaded: LoadedCell, workspace: WorkspaceMap, choice: PlacementChoice
+) -> Region:
+    layers = loaded.cell.bin_scan.layers
+    heights = np.array([workspace.z.min() - min(layers), workspace.z.max()])
+    fixed = {
+        name: float(np.radians(value)) if name == "yaw" else value
+        for name, value in choice.fixed.items()
+    }
+    return region_of(
+        loaded.cell.placement,
+        {"x": workspace.x, "y": workspace.y, "z": heights},
+        limits=choice.limits,
+        fixed=fixed,
+    )
+
+
+def _question(
+    loaded: LoadedCell, workspace: WorkspaceMap, region: Region, evaluator: Evaluator
+) -> Question:
     scene = Scene.build(loaded, with_bin=False)
-    fit = BinFit(scene.robot, loaded, scene.scan_configuration)
-    layer = float(np.mean(loaded.cell.bin_scan.layers))
-    region = region_of(
-        loaded.cell.placement, workspace.x, workspace.y, workspace.z - layer
-    )
-    pose = loaded.cell.bin.pose.matrix()
-    yaw = float(np.arctan2(pose[1, 0], pose[0, 0]))
-    table = CandidateTable()
-    yaws = (yaw, yaw + np.pi / 2)
-
-    def is_feasible(point: LatticePoint) -> bool:
-        return any(_try(point, angle) for angle in yaws)
-
-    def _try(point: LatticePoint, angle: float) -> bool:
-        place = (
-            float(workspace.x[point.x]),
-            float(workspace.y[point.y]),
-            float(workspace.z[point.z]) - layer,
-            angle,
-        )
-        reason = _reason(place, region, fit)
-        if reason:
-            table.add(Candidate(pose=place, reason=reason))
-            return False
-        changed = loaded.with_changes(bin_pose=yaw_transform(*place))
-        table.add(Candidate(pose=place, score=score_cell(changed), exact=True))
-        return True
-
-    if choose_by_paper(workspace, is_feasible) is None:
-        raise SceneError(f"{loaded.source}: the bin can stand nowhere on the map")
-    chosen = len(table.rows) - 1
-    T = yaw_transform(*table.rows[chosen].pose)
-    placed = loaded.with_changes(
-        bin_pose=T, scan_configuration_rad=loaded.scan_configuration_rad
-    )
-    provenance, stamp = _stamped(placed, workspace, "paper")
-    return BinPlacement(
-        bin_pose=T,
-        scan_configuration=scene.scan_configuration,
-        chosen=chosen,
-        runner_up=-1,
-        paper_choice=chosen,
-        rule="paper",
-        candidate_pose=table.poses(),
-        score=table.values("score"),
-        worst_point=table.values("worst_point"),
-        reachable_share=table.values("reachable_share"),
-        exact=table.exact(),
-        reason=table.reasons(),
-        margin={},
-        joint_names=scene.robot.joint_names,
-        stamp=stamp,
-        provenance=provenance,
-        run=clock.finish(),
+    scene.require_free_scan_configuration()
+    return Question(
+        loaded=loaded,
+        workspace=workspace,
+        region=region,
+        scene=scene,
+        fit=BinFit(scene.robot, loaded, scene.scan_configuration),
+        evaluator=evaluator,
     )
 
 
-def _reason(
-    place: tuple[float, float, float, float], region: Region, fit: BinFit
-) -> str:
-    outside = region.outside(np.array(place))
-    if outside:
-        return f"{outside} is outside the region"
-    contact = fit.contact(yaw_transform(*place))
-    return "" if contact is None else contact.reason
+def _decide(question: Question, choice: PlacementChoice) -> Decision:
+    if choice.bin_pose is not None:
+        x, y, z, yaw_deg = choice.bin_pose
+        pose: Pose = (x, y, z, float(np.radians(yaw_deg)))
+        return decide_as_given(question, pose)
+    if choice.rule == "paper":
+        return decide_by_paper(question)
+    return decide_by_search(question, choice.top)
 
 
-def _stamped(
-    placed: LoadedCell, workspace: WorkspaceMap, rule: str
-) -> tuple[Provenance, Stamp]:
+def _record(
+    question: Question,
+    decision: Decision,
+    outcome: Outcome,
+    choice: PlacementChoice,
+    clock: RunClock,
+) -> BinPlacement:
+    table, names = decision.table, question.scene.robot.joint_names
+    T_base_bin = yaw_transform(*table.rows[outcome.chosen].pose)
+    q = np.array(outcome.scan.q)
+    placed = question.loaded.with_changes(
+        bin_pose=T_base_bin,
+        scan_configuration_rad=dict(zip(names, q.tolist(), strict=True)),
+    )
     scene = Scene.build(placed, with_bin=True)
     scene.require_free_scan_configuration()
+    rule = "given" if choice.bin_pose is not None else choice.rule
     document = scan_document(
         scene,
         kind="bin_placement",
@@ -168,24 +244,69 @@ def _stamped(
         settings={
             **checking_settings(scene),
             "roadmap": roadmap_settings(),
+            "placement": placement_settings()
+            | {
+                "top": choice.top,
+                "limits": {k: list(v) for k, v in choice.limits.items()},
+                "fixed": dict(choice.fixed),
+                "scan_configuration": "new" if outcome.scan.is_new else "kept",
+            },
         },
-        source_sha256=workspace.stamp.content_sha256,
+        source_sha256=question.workspace.stamp.content_sha256,
     )
-    return provenance_from_document(document), Stamp(**document["stamp"])
+    return BinPlacement(
+        bin_pose=T_base_bin,
+        scan_configuration=q,
+        chosen=outcome.chosen,
+        runner_up=outcome.runner_up,
+        paper_choice=outcome.paper_choice,
+        rule=rule,
+        candidate_pose=table.poses(),
+        score=table.values("score"),
+        worst_point=table.values("worst_point"),
+        reachable_share=table.values("reachable_share"),
+        exact=table.exact(),
+        reason=table.reasons(),
+        margin=outcome.margin,
+        joint_names=names,
+        stamp=Stamp(**document["stamp"]),
+        provenance=provenance_from_document(document),
+        run=clock.finish(),
+    )
 
 
-def summary_of_placement(placement: BinPlacement) -> dict[str, Any]:
-    """Headline of a placement: pose, score."""
-    x, y, z, yaw = placement.candidate_pose[placement.chosen].tolist()
-    return {
-        "rule": placement.rule,
-        "bin_pose_x_y_z_m": _rounded(np.array([x, y, z])),
-        "yaw_deg": round(float(np.degrees(yaw)), 2),
-        "score_percent": round(float(placement.score[placement.chosen]), 2),
-        "worst_point_percent": round(float(placement.worst_point[placement.chosen]), 2),
-        "candidates": len(placement.reason),
-    }
+def _draw(
+    path: Path,
+    placement: BinPlacement,
+    workspace: WorkspaceMap,
+    question: Question,
+    run: RunOptions,
+) -> None:
+    from reachmap.plots.placement import draw_placement
+    from reachmap.plots.style import figure_bytes
+
+    figure = draw_placement(
+        placement, workspace, camera_view=_camera_view(placement, question)
+    )
+    data = figure_bytes(
+        figure,
+        "svg" if path.suffix == ".svg" else "png",
+        title="Where the bin goes",
+        config_sha256=placement.stamp.config_sha256,
+    )
+    publish(path, [data], overwrite=run.overwrite)
 
 
-def _rounded(values: FloatArray) -> list[float]:
-    return [round(float(v), 4) + 0.0 for v in values]
+def _camera_view(placement: BinPlacement, question: Question) -> FloatArray | None:
+    """What the camera sees at the height of the rim, shape (4, 2) [m]."""
+    cell, scene = question.loaded.cell, question.scene
+    if cell.camera is None:
+        return None
+    camera = Camera(scene.robot, question.loaded)
+    if not camera.is_carried:
+        return None
+    T_base_camera = (
+        scene.kinematics.forward(placement.scan_configuration) @ camera.T_tcp_camera
+    )
+    rim = float(placement.bin_pose[2, 3]) + cell.bin.inner[2]
+    return picture_corners(T_base_camera, cell.camera, rim)

@@ -1,0 +1,195 @@
+"""Exact scores on all cores, with one set of workers for the whole search."""
+
+from __future__ import annotations
+
+import json
+import secrets
+from collections import OrderedDict
+from collections.abc import Iterator, Sequence
+from contextlib import closing, contextmanager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from reachmap._typing import FloatArray
+from reachmap.errors import EngineError
+from reachmap.placement.exact import PlacedScene, Pose, PoseScore
+from reachmap.scans.crew import Crew
+from reachmap.scans.encoding import json_from_value, value_from_json
+from reachmap.scans.executors import open_lanes
+from reachmap.scans.progress import Progress
+from reachmap.scans.results import last_line
+from reachmap.scans.tasks import Job, Parcel, package_versions
+from reachmap.scans.work import one_frame
+
+if TYPE_CHECKING:
+    from reachmap.cell.loading import LoadedCell
+
+SCENES_KEPT = 2
+ALWAYS = -1.0
+USUAL_POSES = 90
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Evaluation:
+    """What became of one pose with the bin in the scene.
+
+    Attributes
+    ----------
+    bound : float
+        No score can be higher [percent].
+    score : PoseScore or None
+        None if the bound is not above what was asked for, or the scan configuration
+        is blocked.
+    blocked : str
+        ``"A | B"`` that touch at the scan configuration, or "".
+    """
+
+    bound: float
+    score: PoseScore | None
+    blocked: str = ""
+
+
+class Evaluator:
+    """Scores poses exactly; made by :func:`open_evaluator`.
+
+    Parameters
+    ----------
+    crew : Crew
+    progress : Progress
+
+    Attributes
+    ----------
+    cpu_s : float
+        What the workers have spent so far.
+    mapped : int
+        Poses looked at so far with the bin in the scene.
+    """
+
+    def __init__(self, crew: Crew, progress: Progress) -> None:
+        self._crew, self._progress = crew, progress
+        self._known: dict[tuple[float, ...], Evaluation] = {}
+        self.cpu_s = 0.0
+        self.mapped = 0
+
+    def evaluate(
+        self,
+        poses: Sequence[Pose],
+        q: FloatArray,
+        *,
+        above: float = ALWAYS,
+    ) -> list[Evaluation]:
+        """Score poses, each from a scan configuration.
+
+        Parameters
+        ----------
+        poses : sequence of (x, y, z [m], yaw [rad])
+        q : array, shape (dof,) or (poses, dof)
+            Scan configuration of all, or of each [rad].
+        above : float
+            A pose whose bound is not above this need not be scored [percent].
+        """
+        starts = np.broadcast_to(q, (len(poses), np.shape(q)[-1]))
+        keys = [
+            (*pose, *start.tolist()) for pose, start in zip(poses, starts, strict=True)
+        ]
+        missing = [key for key in dict.fromkeys(keys) if self._is_open(key, above)]
+        units = {unit_of_numbers([*key, above]): key for key in missing}
+        with closing(self._crew.replies(units)) as replies:
+            for reply in replies:
+                if reply is None:
+                    self._progress.tick()
+                    continue
+                content = json.loads(reply.payload)
+                if reply.failed:
+                    raise EngineError(f"a bin pose failed: {last_line(content)}")
+                self._known[units[reply.unit]] = _evaluation(value_from_json(content))
+                self.cpu_s += reply.measure.cpu_s
+                self.mapped += 1
+                self._progress.add(1, 1)
+        return [self._known[key] for key in keys]
+
+    def _is_open(self, key: tuple[float, ...], above: float) -> bool:
+        """Whether a pose must be looked at, or looked at again."""
+        known = self._known.get(key)
+        if known is None:
+            return True
+        return known.score is None and not known.blocked and known.bound > above
+
+
+@contextmanager
+def open_evaluator(
+    loaded: LoadedCell, *, workers: int, executor: str, progress: Progress
+) -> Iterator[Evaluator]:
+    """Start workers that score poses, and stop them afterwards."""
+    job = Job(
+        function=evaluate_unit,
+        prepare=Prepared,
+        encode=json_from_value,
+        tally=one_frame,
+        context=loaded,
+        packages=package_versions(),
+    )
+    parcel = Parcel(key=secrets.token_hex(16), job=job)
+    with open_lanes(executor, workers, parcel) as lanes, Crew(lanes) as crew:
+        progress.begin(USUAL_POSES)
+        yield Evaluator(crew, progress)
+        progress.end()
+
+
+class Prepared:
+    """A worker's scenes; the last few are kept."""
+
+    def __init__(self, loaded: LoadedCell) -> None:
+        self.loaded = loaded
+        self._scenes: OrderedDict[Pose, PlacedScene] = OrderedDict()
+
+    def scene_at(self, pose: Pose) -> PlacedScene:
+        """Scene with the bin at a pose, surveyed."""
+        if pose not in self._scenes:
+            self._scenes[pose] = PlacedScene.build(self.loaded, pose)
+        self._scenes.move_to_end(pose)
+        while len(self._scenes) > SCENES_KEPT:
+            self._scenes.popitem(last=False)
+        return self._scenes[pose]
+
+
+def evaluate_unit(prepared: Prepared, unit: int) -> dict[str, Any]:
+    """Score one pose; the unit's number says which, see :func:`unit_of_numbers`."""
+    x, y, z, yaw, *rest = numbers_of_unit(unit)
+    q, above = np.array(rest[:-1]), rest[-1]
+    placed = prepared.scene_at((x, y, z, yaw))
+    pair = placed.scene.checker.blocking_pair(q)
+    blocked = placed.scene.checker.body_pairs[pair] if pair >= 0 else ""
+    if blocked or placed.bound <= above:
+        return {"bound": placed.bound, "blocked": blocked, "score": None}
+    score = placed.score_from(q)
+    return {
+        "bound": placed.bound,
+        "blocked": "",
+        "score": {name: getattr(score, name) for name in score.__slots__},
+    }
+
+
+def unit_of_numbers(numbers: Sequence[float]) -> int:
+    """Number of a unit that carries float64 numbers, bit for bit.
+
+    Units are numbered before workers start, and poses come up while they work.
+    """
+    return int.from_bytes(b"\x01" + np.asarray(numbers, ">f8").tobytes(), "big")
+
+
+def numbers_of_unit(unit: int) -> list[float]:
+    """Undo :func:`unit_of_numbers`."""
+    raw = unit.to_bytes((unit.bit_length() + 7) // 8, "big")[1:]
+    return [float(v) for v in np.frombuffer(raw, ">f8")]
+
+
+def _evaluation(content: dict[str, Any]) -> Evaluation:
+    score = content["score"]
+    return Evaluation(
+        bound=content["bound"],
+        score=None if score is None else PoseScore(**score),
+        blocked=content["blocked"],
+    )

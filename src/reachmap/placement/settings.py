@@ -1,0 +1,47 @@
+"""How placements are searched for, as stored in artefacts."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from reachmap.placement import (
+    decision,
+    exact,
+    footprint,
+    margins,
+    places,
+    refine,
+    scan_choice,
+    viewpoints,
+)
+
+
+def placement_settings() -> dict[str, Any]:
+    """Everything that a placement depends on besides the cell, the map and options."""
+    return {
+        "coarse_grid": list(footprint.COARSE_GRID),
+        "max_layers": footprint.MAX_LAYERS,
+        "attempts": exact.ATTEMPTS,
+        "steps_per_square": places.STEPS_PER_SQUARE,
+        "yaw_step_deg": places.YAW_STEP_DEG,
+        "yaws_per_level": places.YAWS_PER_LEVEL,
+        "turns_deg": list(decision.TURNS_DEG),
+        "places_turned": decision.PLACES_TURNED,
+        "refine_steps": np.round(refine.FIRST_STEPS, 9).tolist(),
+        "refine_rounds": refine.ROUNDS,
+        "margin_points": margins.DROP_POINTS,
+        "margin_shifts_m": list(margins.SHIFTS_M),
+        "margin_turns_rad": np.round(margins.TURNS_RAD, 9).tolist(),
+        "views": {
+            "distances": viewpoints.DISTANCES,
+            "tilts_deg": list(viewpoints.TILTS_DEG),
+            "azimuths": viewpoints.AZIMUTHS,
+            "roll_step_deg": viewpoints.ROLL_STEP_DEG,
+            "offsets": list(viewpoints.OFFSETS),
+            "finalists": scan_choice.FINALISTS,
+            "apart_rad": scan_choice.APART_RAD,
+            "equal_points": scan_choice.EQUAL_POINTS,
+        },
+    }
