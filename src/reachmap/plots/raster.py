@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -250,7 +251,7 @@ def _fill(
 
 
 def _weights(
-    corner: FloatArray, x: FloatArray, y: FloatArray
+    corner: FloatArray, x: Any, y: Any
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Barycentric weights of points; outside everything for a facet seen edge-on.
 

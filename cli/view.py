@@ -1,0 +1,91 @@
+"""``reachmap view``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from reachmap.cli import options
+
+PORT = 8080
+
+
+def _test_grasp(
+    ctx: click.Context, parameter: click.Parameter, values: tuple[str, ...]
+) -> tuple[tuple[int, ...], ...]:
+    """Turn each ``LAYER,Y,X,ORIENTATION`` into four numbers."""
+    found = []
+    for value in values:
+        parts = value.split(",")
+        if len(parts) != 4 or not all(p.isascii() and p.isdigit() for p in parts):
+            raise click.BadParameter(
+                f"{value!r} is not LAYER,Y,X,ORIENTATION, such as 0,3,5,12."
+            )
+        found.append(tuple(int(part) for part in parts))
+    return tuple(found)
+
+
+@click.command("view")
+@click.argument("artefact", metavar="FILE", type=options.INPUT_FILE)
+@click.option(
+    "--html",
+    "page",
+    type=options.OUTPUT_PATH,
+    metavar="PATH",
+    help="Write one page with playback that needs no server and no network, and end.",
+)
+@click.option(
+    "--path",
+    "test_grasps",
+    multiple=True,
+    callback=_test_grasp,
+    metavar="LAYER,Y,X,ORIENTATION",
+    help="Play the path to this test grasp of a bin map, counted from 0. Repeatable "
+    "with --html; by default the shortest path in each quadrant.",
+)
+@click.option(
+    "--port",
+    type=click.IntRange(0, 65535),
+    default=PORT,
+    show_default=True,
+    help="Port of the live view on 127.0.0.1; 0 takes a free one.",
+)
+@click.option(
+    "--open/--no-browser",
+    "open_browser",
+    default=True,
+    help="Open the live view in the browser, or only print its address.",
+)
+@options.overwrite_option
+def command(
+    artefact: Path,
+    page: Path | None,
+    test_grasps: tuple[tuple[int, int, int, int], ...],
+    port: int,
+    open_browser: bool,
+    overwrite: bool,
+) -> None:
+    """Look at a cell or an artefact in 3D, in the browser.
+
+    FILE is a workspace map, a placement or a bin map. The cell is drawn with the shapes
+    that collisions are checked on, and the points of the map in the colours of their
+    reachability. A slider chooses the level, a filter the state of the test frames. A
+    click on a point puts the arm there; where it cannot be, the bodies in the way are
+    red. Paths of a bin map are played in the time the arm takes for them. The view is
+    served on this machine alone until Ctrl-C. Needs the extra [view].
+
+    Example: reachmap view bin.h5 --html bin-3d.html
+    """
+    from reachmap.tools.view import ViewOptions, view
+
+    written = view(
+        artefact,
+        page=page,
+        test_grasps=test_grasps,
+        overwrite=overwrite,
+        options=ViewOptions(port=port, open_browser=open_browser),
+        on_ready=lambda address: click.echo(f"{address}  (Ctrl-C ends)"),
+    )
+    if written is not None:
+        click.echo(written)

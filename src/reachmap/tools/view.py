@@ -1,0 +1,119 @@
+"""``reachmap view``: an artefact or a cell in 3D, live or as one page."""
+
+from __future__ import annotations
+
+import contextlib
+import time
+import webbrowser
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from reachmap.errors import SettingsError
+from reachmap.maps.any_file import Artefact, read_artefact
+from reachmap.maps.publish import check_output, publish
+from reachmap.maps.records import BinMap
+from reachmap.tools.options import cell_of_artefact
+from reachmap.view.engine import HOST, require_viewer, start_server, stop_server
+
+PORT = 8080
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ViewOptions:
+    """How the live view is served."""
+
+    port: int = PORT
+    open_browser: bool = False
+
+
+def view(
+    artefact: Path,
+    *,
+    page: Path | None = None,
+    test_grasps: Sequence[tuple[int, int, int, int]] = (),
+    overwrite: bool = False,
+    options: ViewOptions | None = None,
+    on_ready: Callable[[str], None] = lambda address: None,
+    wait: Callable[[], None] | None = None,
+) -> Path | None:
+    """Show an artefact until interrupted, or write it as one page with playback.
+
+    Parameters
+    ----------
+    artefact : Path
+        A workspace map, a placement or a bin map.
+    page : Path, optional
+        Where to write the page; no server is left running then.
+    test_grasps : sequence of tuple of int
+        layer, y, x, orientation of the bin map's paths to play; chosen if left out.
+    overwrite : bool
+        Replace the page if it exists.
+    options : ViewOptions, optional
+    on_ready : callable
+        Is told the address when the live view can be opened.
+    wait : callable, optional
+        Returns when the live view is to end; by default it ends with Ctrl-C.
+
+    Returns
+    -------
+    Path or None
+        The page.
+
+    Raises
+    ------
+    MissingExtraError
+        The viewer is not installed.
+    MapFileError, CellError, SceneError
+        The artefact cannot be read, or its cell not be built here.
+    SettingsError
+        A test grasp is unknown or has no path.
+    OutputError
+        The page exists, or the port is taken.
+    """
+    require_viewer()
+    if page is not None:
+        check_output(page, overwrite=overwrite)
+    # Imported here: without the extra there is nothing to load the engines for.
+    from reachmap.core.solids import SolidCell
+
+    record = read_artefact(artefact)
+    paths = _paths(record, test_grasps)
+    cell = SolidCell.build(cell_of_artefact(record.provenance, str(artefact)))
+    if page is not None:
+        from reachmap.view.page import page_of
+
+        text = page_of(record, cell, paths)
+        return publish(page, [text.encode()], overwrite=overwrite)
+    from reachmap.view.app import App
+
+    options = options or ViewOptions()
+    server = start_server(options.port)
+    try:
+        App(server, record, cell, paths[0] if paths else None)
+        address = f"http://{HOST}:{server.get_port()}"
+        on_ready(address)
+        if options.open_browser:
+            webbrowser.open(address)
+        (wait or _until_interrupted)()
+    finally:
+        stop_server(server)
+    return None
+
+
+def _paths(
+    record: Artefact, test_grasps: Sequence[tuple[int, int, int, int]]
+) -> tuple[int, ...]:
+    if not test_grasps:
+        return ()
+    if not isinstance(record, BinMap):
+        raise SettingsError("--path is for bin maps, which keep their paths")
+    from reachmap.view.playback import find_path
+
+    return tuple(find_path(record, test_grasp) for test_grasp in test_grasps)
+
+
+def _until_interrupted() -> None:
+    with contextlib.suppress(KeyboardInterrupt):
+        while True:
+            time.sleep(0.5)

@@ -1,0 +1,1 @@
+"""A cell and its maps in three dimensions, in the browser (extra ``[view]``)."""

@@ -1,0 +1,172 @@
+"""A stored path as configurations in even steps of time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from reachmap._typing import FloatArray
+from reachmap.core.robot import RobotModel
+from reachmap.core.timing import merge_straight, segment_times_s, straight_way_time_s
+from reachmap.errors import SettingsError
+from reachmap.maps.records import BinMap
+from reachmap.view.points import shortest_paths
+
+FRAMES_PER_S = 24.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Playback:
+    """What the arm does from the scan configuration to a grasp and back out of it.
+
+    Attributes
+    ----------
+    configuration : array, shape (k, dof)
+        [rad].
+    time_s : array, shape (k,)
+        When each is taken, from 0; the last is the execution time: the planned part,
+        the straight approach, and back by the same way.
+    grasp : int
+        Index of the configuration at the grasp.
+    test_grasp : tuple of int
+        layer, y, x, orientation.
+    """
+
+    configuration: FloatArray
+    time_s: FloatArray
+    grasp: int
+    test_grasp: tuple[int, int, int, int]
+
+
+def way_points(record: BinMap, row: int) -> tuple[FloatArray, FloatArray]:
+    """Way-points of a stored path: the planned part, and the straight approach.
+
+    The last of the first is the first of the second.
+    """
+    paths = record.paths
+    start = int(paths.row_size[:row].sum())
+    path = paths.configuration[start : start + int(paths.row_size[row])]
+    planned = int(paths.planned_size[row])
+    return path[:planned], path[planned - 1 :]
+
+
+def playback_of(record: BinMap, row: int, robot: RobotModel) -> Playback:
+    """Time a stored path by the arm's limits, as its execution time was measured.
+
+    Parameters
+    ----------
+    record : BinMap
+    row : int
+        Of its paths.
+    robot : RobotModel
+        Gives the limits.
+    """
+    limits = robot.velocity_rad_s, robot.acceleration_rad_s2
+    planned, approach = way_points(record, row)
+    corners = merge_straight(planned) if len(planned) > 1 else planned
+    times = segment_times_s(corners, *limits) if len(corners) > 1 else np.zeros(0)
+    way_s = straight_way_time_s(approach, *limits)
+    parts = [
+        _eased(np.stack([a, b]), float(time), *limits)
+        for a, b, time in zip(corners[:-1], corners[1:], times, strict=True)
+    ]
+    if len(approach) > 1:
+        down, when = _eased(approach, way_s, *limits)
+        parts += [(down, when), (down[::-1], when)]
+    configuration, time_s, starts = _joined(planned[:1], parts)
+    index = record.paths.index[row]
+    return Playback(
+        configuration=configuration,
+        time_s=time_s,
+        grasp=starts[-1] if len(approach) > 1 else len(configuration) - 1,
+        test_grasp=(int(index[0]), int(index[1]), int(index[2]), int(index[3])),
+    )
+
+
+def _joined(
+    first: FloatArray, parts: Sequence[tuple[FloatArray, FloatArray]]
+) -> tuple[FloatArray, FloatArray, list[int]]:
+    """Configurations and times of parts one after another, and where each begins."""
+    configurations, times, starts = [first], [np.zeros(1)], []
+    count, now = 1, 0.0
+    for way, when in parts:
+        starts.append(count - 1)
+        configurations.append(way[1:])
+        times.append(now + when[1:])
+        count, now = count + len(way) - 1, now + float(when[-1])
+    return np.concatenate(configurations), np.concatenate(times), starts
+
+
+def _eased(
+    way: FloatArray, time_s: float, velocity: FloatArray, acceleration: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Points of a way from rest to rest in a time, (k, dof), and their times (k,).
+
+    Speed is a trapezoid: as short a ramp as the acceleration takes on average.
+    """
+    count = max(2, round(time_s * FRAMES_PER_S) + 1)
+    steps = np.linspace(0.0, 1.0, count)
+    change = np.abs(way[-1] - way[0])
+    # Share of the time spent on each ramp; one half is a triangle.
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ramp_s = float(np.nanmin(np.where(change > 0, velocity / acceleration, np.nan)))
+    ramp = float(np.clip(ramp_s / max(time_s, 1e-9), 0.05, 0.5))
+    top = 1.0 / (1.0 - ramp)
+    share = np.where(
+        steps < ramp,
+        0.5 * top * steps**2 / ramp,
+        np.where(
+            steps > 1.0 - ramp,
+            1.0 - 0.5 * top * (1.0 - steps) ** 2 / ramp,
+            top * (steps - 0.5 * ramp),
+        ),
+    )
+    place = share * (len(way) - 1)
+    knots = np.arange(len(way))
+    points = np.stack([np.interp(place, knots, column) for column in way.T], axis=-1)
+    return points, time_s * steps
+
+
+def choose_paths(record: BinMap) -> tuple[int, ...]:
+    """Rows of paths worth watching: the shortest one in each quadrant of the bin."""
+    rows = shortest_paths(record)
+    length = np.full(rows.shape, np.inf)
+    has = rows >= 0
+    length[has] = record.path_length[tuple(record.paths.index[rows[has]].T)]
+    chosen = []
+    for north in (True, False):
+        for east in (False, True):
+            mask = (record.y >= 0) == north
+            inside = mask[None, :, None, None] & ((record.x >= 0) == east)[:, None]
+            here = np.where(np.broadcast_to(inside, rows.shape), length, np.inf)
+            best = int(here.argmin())
+            if np.isfinite(here.flat[best]):
+                chosen.append(int(rows.flat[best]))
+    return tuple(dict.fromkeys(chosen))
+
+
+def find_path(record: BinMap, test_grasp: tuple[int, int, int, int]) -> int:
+    """Row of the shortest path to a test grasp.
+
+    Parameters
+    ----------
+    record : BinMap
+    test_grasp : tuple of int
+        layer, y, x, orientation.
+
+    Raises
+    ------
+    SettingsError
+        There is no such test grasp, or no path to it.
+    """
+    shape = record.status.shape
+    name = ",".join(map(str, test_grasp))
+    if not all(0 <= i < n for i, n in zip(test_grasp, shape, strict=True)):
+        last = ",".join(str(n - 1) for n in shape)
+        raise SettingsError(f"--path {name}: no such test grasp (0,0,0,0 to {last})")
+    row = int(shortest_paths(record)[test_grasp])
+    if row < 0:
+        raise SettingsError(f"--path {name}: no path to this test grasp is stored")
+    return row
