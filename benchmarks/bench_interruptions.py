@@ -10,8 +10,10 @@ Runs a ``reachmap`` scan once undisturbed, then again while injuring it, and com
 ``--room BYTES``
     Limit the size of its files, then lift the limit and resume.
 
-Example: python benchmarks/bench_interruptions.py --kills 30 --worker-every 2
---room 100000 -- bin-scan --cell ur5-eye-in-hand --set bin_scan.grid=[5,4] -j 2
+Without any of them, a little of each is done to a small bin scan.
+
+Example: python benchmarks/bench_interruptions.py --kills 30 -- bin-scan
+--cell ur5-eye-in-hand --set bin_scan.grid=[5,4] -j 2
 """
 
 from __future__ import annotations
@@ -29,6 +31,9 @@ from pathlib import Path
 
 import h5py
 import psutil
+
+SMALL_SCAN = ["bin-scan", "--cell", "ur5-eye-in-hand", "-j", "2"]
+SMALL_SCAN += ["--set", "bin_scan.grid=[5,4]", "--set", "bin_scan.repeats=2"]
 
 
 def main() -> int:
@@ -60,8 +65,12 @@ def parse_arguments() -> argparse.Namespace:
     parser.add_argument("--worker-every", type=float, default=0.0)
     parser.add_argument("--room", type=int, default=0)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("command", nargs="+", help="reachmap command without -o")
-    return parser.parse_args()
+    parser.add_argument("command", nargs="*", help="reachmap command without -o")
+    options = parser.parse_args()
+    options.command = options.command or SMALL_SCAN
+    if not (options.kills or options.worker_every or options.room):
+        options.kills, options.worker_every, options.room = 3, 2.0, 100_000
+    return options
 
 
 def kill_often(

@@ -1,6 +1,8 @@
 from __future__ import annotations
 
 import json
+import multiprocessing
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 
 import pytest
 import toy_work
@@ -148,6 +150,21 @@ def test_failing_to_publish_keeps_the_journal(output, monkeypatch):
     outcome, artefact = run(output)
     assert (outcome.computed, outcome.resumed) == (0, 40)
     assert artefact == expected()
+
+
+def test_any_executor_will_do(output):
+    """A pool of threads, and a pool of processes that breaks, give the same map."""
+    assert run(output, executor=lambda: ThreadPoolExecutor(3))[1] == expected()
+    spawn = multiprocessing.get_context("spawn")
+    with pytest.raises(IncompleteError, match="unit 11: killed 3 workers"):
+        run(
+            output,
+            Toy(poison=(11,)),
+            workers=2,
+            executor=lambda: ProcessPoolExecutor(2, mp_context=spawn),
+            overwrite=True,
+        )
+    assert json.loads(output.read_text()) == expected(failed=(11,))
 
 
 def test_an_unknown_executor_is_refused(output):

@@ -8,7 +8,8 @@ dask:local             a Dask cluster on this machine, gone after the run
 dask:tcp://HOST:PORT   a Dask cluster that is there already (also ``dask:tls://…``)
 ====================== ===========================================================
 
-Any other ``concurrent.futures.Executor`` takes part as :func:`lane_of`.
+The library takes any other ``concurrent.futures.Executor``, too: as a callable that
+makes it, and makes it again after its workers have died.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor
 from contextlib import ExitStack, contextmanager
-from typing import Any
+from typing import Any, TypeAlias
 
 from reachmap.errors import (
     IncompleteError,
@@ -37,17 +38,21 @@ WINDOW_AGE_S = 5.0
 WAIT_FOR_WORKERS_S = 300.0
 SCHEMES = ("tcp://", "tls://", "ws://", "wss://")
 
+ExecutorChoice: TypeAlias = str | Callable[[], Executor]
+
 log = logging.getLogger(__name__)
 
 
 @contextmanager
-def open_lanes(name: str, workers: int, parcel: Parcel) -> Iterator[list[LaneSpec]]:
+def open_lanes(
+    name: ExecutorChoice, workers: int, parcel: Parcel
+) -> Iterator[list[LaneSpec]]:
     """Make the lanes that an ``--executor`` name stands for.
 
     Parameters
     ----------
-    name : str
-        See the table of this module.
+    name : str or callable
+        See the table of this module; or what makes an executor.
     workers : int
         Number of workers; a Dask cluster that is there already has its own.
     parcel : Parcel
@@ -64,7 +69,9 @@ def open_lanes(name: str, workers: int, parcel: Parcel) -> Iterator[list[LaneSpe
         When Dask is not installed.
     """
     check_executor(name)
-    if name != "processes":
+    if not isinstance(name, str):
+        yield [_lane_of(name, workers, parcel)]
+    elif name != "processes":
         with _dask_client(name.removeprefix("dask:"), workers) as client:
             yield [_dask_lane(client, parcel)]
     elif workers == 1:
@@ -74,33 +81,23 @@ def open_lanes(name: str, workers: int, parcel: Parcel) -> Iterator[list[LaneSpe
             yield process_lanes(parcel, workers)
 
 
-def check_executor(name: str) -> None:
+def check_executor(name: ExecutorChoice) -> None:
     """Refuse a name that is not in the table of this module.
 
     Raises
     ------
     SettingsError
     """
-    address = name.removeprefix("dask:")
-    if name == "processes" or name == "dask:local":
+    if not isinstance(name, str) or name in ("processes", "dask:local"):
         return
+    address = name.removeprefix("dask:")
     if address == name or not address.startswith(SCHEMES):
         raise SettingsError(
             f"executor {name!r}: expected processes, dask:local or dask:tcp://HOST:PORT"
         )
 
 
-def lane_of(make: Callable[[], Executor], parcel: Parcel, *, workers: int) -> LaneSpec:
-    """Lane of any executor, such as one of ``mpi4py.futures``.
-
-    Parameters
-    ----------
-    make : callable
-        Makes the executor; called again after its workers have died.
-    parcel : Parcel
-    workers : int
-        Number of units it can work on at a time.
-    """
+def _lane_of(make: Callable[[], Executor], workers: int, parcel: Parcel) -> LaneSpec:
     return LaneSpec(
         start=make,
         stop=lambda executor: executor.shutdown(wait=False, cancel_futures=True),

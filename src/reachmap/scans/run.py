@@ -22,7 +22,7 @@ from typing import Any
 
 from reachmap.maps import RunClock, RunInfo, check_output
 from reachmap.scans.crew import Crew
-from reachmap.scans.executors import check_executor, open_lanes
+from reachmap.scans.executors import ExecutorChoice, check_executor, open_lanes
 from reachmap.scans.journal import (
     SYNC_INTERVAL_S,
     Journal,
@@ -66,7 +66,7 @@ def run_scan(
     *,
     output: Path,
     workers: int = 1,
-    executor: str = "processes",
+    executor: ExecutorChoice = "processes",
     shard: tuple[int, int] | None = None,
     restart: bool = False,
     overwrite: bool = False,
@@ -81,7 +81,7 @@ def run_scan(
         The artefact. Its journal lies beside it until it is published.
     workers : int
         Processes; 1 works in this process.
-    executor : str
+    executor : str or callable
         See :mod:`reachmap.scans.executors`.
     shard : (int, int), optional
         (i, N): do the i-th of N shares, and leave the journal for ``merge``.
@@ -146,7 +146,7 @@ def run_units(
     *,
     output: Path,
     workers: int = 1,
-    executor: str = "processes",
+    executor: ExecutorChoice = "processes",
     shard: tuple[int, int] | None = None,
     restart: bool = False,
     progress: Progress | None = None,
@@ -217,7 +217,7 @@ def _compute_missing(
     work: Work,
     journal: Journal,
     workers: int,
-    executor: str,
+    executor: ExecutorChoice,
     progress: Progress,
     stop: StopRequest,
 ) -> None:
@@ -263,7 +263,7 @@ def _record(work: Work, reply: Reply, journal: Journal, progress: Progress) -> N
     progress.add(frames, reply.measure.ok)
 
 
-def _is_alone(executor: str, workers: int) -> bool:
+def _is_alone(executor: ExecutorChoice, workers: int) -> bool:
     return executor == "processes" and workers == 1
 
 
