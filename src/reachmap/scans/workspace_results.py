@@ -8,12 +8,18 @@ from typing import Any
 
 import numpy as np
 
-from reachmap._typing import BoolArray, CodeArray, FloatArray, IntArray
+from reachmap._typing import CodeArray, FloatArray, IntArray
 from reachmap.cell.model import Cell
-from reachmap.maps import CubeMap, RunInfo, Stamp, Status, WorkspaceMap
+from reachmap.maps import (
+    CubeMap,
+    RunInfo,
+    Stamp,
+    Status,
+    WorkspaceMap,
+    workspace_map_from_cubes,
+)
 from reachmap.maps.records import freeze
 from reachmap.sampling.frames import CubeFrames, workspace_frames
-from reachmap.sampling.lattice import pooled_percent, stitch
 from reachmap.scans.document import provenance_from_document
 
 
@@ -91,20 +97,8 @@ def assemble_workspace_map(
         end = begin + cube.frames.size
         maps[cube.name] = _cube_map(cube, results, slice(begin, end))
         begin = end
-    stitching = stitch([cube.lattice for cube in cubes])
-    tried = [_count(m.status != Status.NOT_ATTEMPTED) for m in maps.values()]
-
-    def percent(hit: str) -> FloatArray:
-        return pooled_percent(stitching, [_hits(m, hit) for m in maps.values()], tried)
-
-    return WorkspaceMap(
-        cubes=maps,
-        x=stitching.lattice.x,
-        y=stitching.lattice.y,
-        z=stitching.lattice.z,
-        path_reachability=percent("path"),
-        ik_reachability=percent("ik"),
-        ik_free_reachability=percent("ik_free"),
+    return workspace_map_from_cubes(
+        maps,
         scan_configuration=np.array(document["scan_configuration"], float),
         joint_names=tuple(document["joint_names"]),
         body_pairs=tuple(document["body_pairs"]),
@@ -113,20 +107,6 @@ def assemble_workspace_map(
         provenance=provenance_from_document(document),
         run=run,
     )
-
-
-def _hits(cube: CubeMap, kind: str) -> FloatArray:
-    """Frames of each point that count, among those attempted, (nz, ny, nx)."""
-    hit = {
-        "path": cube.status == Status.PATH_FOUND,
-        "ik": cube.n_ik > 0,
-        "ik_free": cube.n_ik_free > 0,
-    }[kind]
-    return _count(hit & (cube.status != Status.NOT_ATTEMPTED))
-
-
-def _count(mask: BoolArray) -> FloatArray:
-    return np.asarray(mask.sum(axis=-1), float)
 
 
 def _cube_map(cube: CubeFrames, results: FrameResults, rows: slice) -> CubeMap:
