@@ -100,7 +100,7 @@ $(RUN)/workspace.h5: $(wildcard cells/$(CELL).yaml $(CELL)) | $(VENV)/.runtime
 	$(REACHMAP) workspace-scan $(CELL) $(SIZE) $(SCAN) -o $@
 
 $(RUN)/placement.h5: $(RUN)/workspace.h5
-	$(REACHMAP) place-bin $< -o $@ --overwrite
+	$(REACHMAP) place-bin $< -j $(WORKERS) -o $@ --overwrite
 
 $(RUN)/bin.h5: $(RUN)/placement.h5
 	$(REACHMAP) bin-scan $< $(SCAN) -o $@

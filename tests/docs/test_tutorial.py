@@ -27,6 +27,7 @@ PRODUCTS = {
     "place-bin": ["placement.h5"],
     "bin-scan": ["bin.h5"],
     "rank": ["ranked.json"],
+    "view": ["bin-3d.html"],
     "report": ["report.html"],
 }
 
