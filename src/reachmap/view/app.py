@@ -15,12 +15,13 @@ from reachmap.core.solids import SolidCell
 from reachmap.errors import ReachmapError
 from reachmap.geometry import yaw_transform
 from reachmap.maps.any_file import Artefact
-from reachmap.maps.records import BinMap, BinPlacement
+from reachmap.maps.records import BinMap, BinPlacement, WorkspaceMap
+from reachmap.maps.statistics import best_level
 from reachmap.view.playback import Playback, choose_paths, playback_of
 from reachmap.view.points import EVERYTHING, points_of
 from reachmap.view.question import Answer, answer, best_first
 from reachmap.view.stage import Stage
-from reachmap.view.words import headline
+from reachmap.view.words import has_bin, headline
 
 if TYPE_CHECKING:
     import viser
@@ -52,7 +53,7 @@ class App:
         self.server: Any = server
         self.record = record
         self.cell = cell
-        self.stage = Stage(server, cell)
+        self.stage = Stage(server, cell, glass_bin=not has_bin(record))
         self.points = points_of(record)
         self.shown: IntArray = np.arange(len(self.points.position))
         self.answer: Answer | None = None
@@ -72,13 +73,16 @@ class App:
     def _build_panel(self) -> None:
         gui = self.server.gui
         gui.add_html(_paragraph(headline(self.record), self.cell.loaded.cell.name))
+        best = self._best_level()
         with gui.add_folder("Points"):
             last = len(self.points.levels) - 1
             self.level: Any = gui.add_slider(
-                "level", min=0, max=max(last, 1), step=1, initial_value=0,
+                "level", min=0, max=max(last, 1), step=1, initial_value=best or 0,
                 disabled=last < 1,
             )  # fmt: skip
-            self.all_levels: Any = gui.add_checkbox(ALL_LEVELS, initial_value=True)
+            self.all_levels: Any = gui.add_checkbox(
+                ALL_LEVELS, initial_value=best is None
+            )
             self.quantity: Any = gui.add_dropdown(
                 "colour", options=tuple(self.points.shares)
             )
@@ -101,6 +105,12 @@ class App:
         self.frame.on_update(lambda _: self.show_frame(int(self.frame.value)))
         self.play.on_click(lambda _: self.play_path())
         self.home.on_click(lambda _: self.go_home())
+
+    def _best_level(self) -> int | None:
+        """Level to begin with; None for all of them."""
+        if isinstance(self.record, WorkspaceMap):
+            return best_level(self.record.path_reachability)
+        return None
 
     def _on_level(self) -> None:
         # Whoever moves the slider wants to see one level.
@@ -228,7 +238,9 @@ class App:
         """Scene that finds colliding configurations again; built when first needed."""
         if self._scene is None:
             try:
-                self._scene = Scene.build(self.cell.loaded)
+                self._scene = Scene.build(
+                    self.cell.loaded, with_bin=has_bin(self.record)
+                )
             except ReachmapError:
                 return None
         return self._scene

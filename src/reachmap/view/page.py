@@ -17,7 +17,7 @@ from reachmap.view.page_frame import framed
 from reachmap.view.playback import Playback, choose_paths, playback_of
 from reachmap.view.points import MapPoints, points_of
 from reachmap.view.stage import Stage
-from reachmap.view.words import headline, legend_name
+from reachmap.view.words import has_bin, headline, legend_name
 
 PAUSE_S, LEVEL_S = 0.7, 1.6
 
@@ -44,7 +44,7 @@ def page_of(record: Artefact, cell: SolidCell, paths: Sequence[int] = ()) -> str
     """
     server = start_server(0)
     try:
-        stage = Stage(server, cell)
+        stage = Stage(server, cell, glass_bin=not has_bin(record))
         points = points_of(record)
         if isinstance(record, BinMap):
             text = _bin_page(server, stage, points, record, paths)

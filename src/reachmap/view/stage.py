@@ -38,11 +38,16 @@ class Stage:
     ----------
     server : viser.ViserServer
     cell : SolidCell
+    glass_bin : bool
+        See through the bin: it was not among the obstacles.
     """
 
-    def __init__(self, server: viser.ViserServer, cell: SolidCell) -> None:
+    def __init__(
+        self, server: viser.ViserServer, cell: SolidCell, *, glass_bin: bool = False
+    ) -> None:
         self.scene: Any = server.scene
         self.cell = cell
+        self._glass_bin = glass_bin
         self._colours = solid_colours(cell.solids)
         self._joints = [
             self.scene.add_frame(f"/cell/joint_{k}", show_axes=False)
@@ -158,6 +163,7 @@ class Stage:
     def _add_solid(self, index: int, solid: Solid) -> Any:
         size = float(np.ptp(solid.vertices, axis=0).max(initial=0.0))
         glass = solid.kind == "body" and size > LARGE_BODY_M
+        glass |= solid.kind == "bin" and self._glass_bin
         return self._mesh(
             f"/cell/joint_{solid.joint}/solid_{index}",
             solid,

@@ -23,6 +23,14 @@ def headline(record: Artefact) -> str:
     return placement_words(record)[0]
 
 
+def has_bin(record: Artefact) -> bool:
+    """Whether the bin was among the obstacles; a workspace is mapped without it."""
+    standing = record.provenance.settings.get("with_bin")
+    if isinstance(standing, bool):
+        return standing
+    return not isinstance(record, WorkspaceMap)
+
+
 def legend_name(record: Artefact) -> str:
     """What the colours of the points mean."""
     if isinstance(record, WorkspaceMap | BinMap):
