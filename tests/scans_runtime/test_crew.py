@@ -181,6 +181,32 @@ def test_a_wide_lane_survives_deaths_that_have_no_culprit(heals):
     assert sorted(cluster.done) == list(range(24))
 
 
+def test_workers_that_die_while_getting_ready_are_replaced():
+    """An executor that heals itself but lost the job is started anew, without blame."""
+
+    class Forgetful(Cluster):
+        def step(self):
+            if self.started < 4:
+                for future, _ in self.pending:
+                    future.set_exception(LookupError("the job is gone"))
+                self.pending = []
+            else:
+                super().step()
+
+    cluster = Forgetful(2)
+    spec = cluster.spec(lost=lambda error: isinstance(error, LookupError))
+    replies = {}
+    with Crew([spec]) as crew:
+        for reply in crew.replies(range(20)):
+            if reply is None:
+                cluster.step()
+            else:
+                replies[reply.unit] = reply
+    assert sorted(replies) == list(range(20))
+    assert failed(replies) == []
+    assert cluster.started == 4
+
+
 def test_all_units_poisoned():
     """Even then the run ends, with every unit given up."""
     assert failed(run(Cluster(2, poison=range(6)), 6)) == list(range(6))

@@ -124,14 +124,10 @@ class Crew:
 
     def _collect(self, lane: Lane) -> Iterator[Reply]:
         done = {future: _exception(future) for future in lane.held if future.done()}
-        # Results first: a broken executor may yet have finished some units.
-        for future in sorted(
-            done, key=lambda one: isinstance(done[one], BrokenExecutor)
-        ):
-            error = done[future]
-            if isinstance(error, BrokenExecutor):
-                self._after_death(lane, error)
-                return
+        lost = [error for error in done.values() if error and lane.spec.lost(error)]
+        for future, error in done.items():
+            if error in lost:
+                continue  # a lost executor may yet have finished other units
             unit = lane.held.pop(future)
             if unit == READY:
                 self._check_ready(lane, error)
@@ -144,6 +140,8 @@ class Crew:
                 self._after_deaths_of(lane, unit, deaths, alone=alone)
             else:
                 raise _as_failure(error)
+        if lost:
+            self._after_death(lane, lost[0])
 
     def _check_ready(self, lane: Lane, error: BaseException | None) -> None:
         if error is not None:

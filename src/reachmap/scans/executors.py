@@ -18,7 +18,7 @@ import logging
 import math
 import time
 from collections.abc import Callable, Iterator
-from concurrent.futures import Executor
+from concurrent.futures import Executor, Future
 from contextlib import ExitStack, contextmanager
 from typing import Any, TypeAlias
 
@@ -29,7 +29,7 @@ from reachmap.errors import (
     SettingsError,
 )
 from reachmap.scans.lanes import LaneSpec
-from reachmap.scans.tasks import Parcel
+from reachmap.scans.tasks import Parcel, compute
 from reachmap.scans.work import unchanged
 from reachmap.scans.workers import in_process_lane, one_thread_each, process_lanes
 
@@ -170,18 +170,49 @@ def _distributed() -> Any:
 
 
 def _dask_lane(client: Any, parcel: Parcel) -> LaneSpec:
-    # As a task's result the job goes to each worker once, also to those that come
-    # later, and it is made again when the workers that had it die.
-    sent = client.submit(unchanged, parcel, pure=False)
     return LaneSpec(
-        # Not pure: a unit that is tried again must be computed again.
-        start=lambda: client.get_executor(pure=False),
+        start=lambda: _DaskExecutor(client, parcel),
         stop=lambda executor: executor.shutdown(wait=False),
-        parcel=sent,
-        label=sent,
+        parcel=parcel.label(),
+        label=parcel.label(),
         window=_Window(client),
-        deaths=_dask_deaths,
+        lost=lambda error: _is_killed(error) and not _is_of_unit(error),
+        deaths=_deaths,
     )
+
+
+class _DaskExecutor(Executor):
+    """Dask's executor, which is given the job once and only then units.
+
+    As the result of a task the job goes to each worker once, also to those that come
+    later, and it is made again when the workers that had it die.
+    """
+
+    def __init__(self, client: Any, parcel: Parcel) -> None:
+        self._parcel = client.submit(unchanged, parcel, pure=False)
+        # Not pure: a unit that is tried again must be computed again.
+        self._executor = client.get_executor(pure=False)
+
+    def submit(self, fn: Any, /, label: Any, *unit: Any) -> Future[Any]:  # type: ignore[override]
+        """Submit a function of the job."""
+        future: Future[Any] = self._executor.submit(fn, self._parcel, *unit)
+        return future
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+        """Forget what was submitted, unless it is to be waited for."""
+        self._executor.shutdown(wait=wait)
+
+
+def _is_killed(error: Any) -> bool:
+    return isinstance(error, _distributed().scheduler.KilledWorker)
+
+
+def _deaths(error: Any) -> int:
+    return int(error.allowed_failures) + 1 if _is_killed(error) else 0
+
+
+def _is_of_unit(error: Any) -> bool:
+    return str(error.task).startswith(f"{compute.__name__}-")
 
 
 class _Window:
@@ -213,9 +244,3 @@ class _Window:
                 f"the Dask cluster has had no workers for {WAIT_FOR_WORKERS_S:.0f} s; "
                 "what is done is kept, the same command goes on from there"
             )
-
-
-def _dask_deaths(error: BaseException) -> int:
-    if not isinstance(error, _distributed().scheduler.KilledWorker):
-        return 0
-    return int(error.allowed_failures) + 1

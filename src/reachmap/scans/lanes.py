@@ -4,13 +4,18 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
-from concurrent.futures import Executor, Future
+from concurrent.futures import BrokenExecutor, Executor, Future
 from dataclasses import dataclass
 from typing import Any
 
 from reachmap.scans.tasks import compute, get_ready
 
 READY = -1  # stands for the unit while a worker gets ready
+
+
+def is_broken(error: BaseException) -> bool:
+    """Whether an exception says that an executor's processes have died."""
+    return isinstance(error, BrokenExecutor)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,6 +38,8 @@ class LaneSpec:
         Number of units that may be in flight now.
     in_order : bool
         Whether one worker takes the units in the order they were handed in.
+    lost : callable
+        Whether an exception of a future says that the executor is of no use any more.
     deaths : callable
         How many workers an exception of a future says have died of its unit, for
         executors that replace dead workers themselves; 0 for other exceptions.
@@ -44,6 +51,7 @@ class LaneSpec:
     label: Any
     window: Callable[[], int]
     in_order: bool = False
+    lost: Callable[[BaseException], bool] = is_broken
     deaths: Callable[[BaseException], int] = lambda error: 0
 
 
