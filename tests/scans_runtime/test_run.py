@@ -2,6 +2,8 @@ from __future__ import annotations
 
 import json
 import multiprocessing
+import os
+import signal
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 
 import pytest
@@ -21,6 +23,7 @@ from reachmap.scans.journal import journal_path
 from reachmap.scans.journal_entries import read_journal
 from reachmap.scans.results import Results, preview
 from reachmap.scans.run import run_scan, run_units
+from reachmap.scans.signals import STOP_SIGNALS
 
 
 @pytest.fixture
@@ -165,6 +168,21 @@ def test_any_executor_will_do(output):
             overwrite=True,
         )
     assert json.loads(output.read_text()) == expected(failed=(11,))
+
+
+def test_a_run_outside_the_main_thread(output):
+    """A service may scan in a thread, where signals cannot be caught."""
+    with ThreadPoolExecutor(1) as pool:
+        assert pool.submit(run, output).result()[1] == expected()
+
+
+def test_signal_handlers_and_environment_are_given_back(output):
+    """After a run the process is as it was."""
+    before = {number: signal.getsignal(number) for number in STOP_SIGNALS}
+    environment = dict(os.environ)
+    run(output, workers=2)
+    assert {number: signal.getsignal(number) for number in STOP_SIGNALS} == before
+    assert dict(os.environ) == environment
 
 
 def test_an_unknown_executor_is_refused(output):

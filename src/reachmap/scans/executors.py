@@ -25,7 +25,6 @@ from typing import Any, TypeAlias
 from reachmap.errors import (
     IncompleteError,
     MissingExtraError,
-    OutputError,
     SettingsError,
 )
 from reachmap.scans.lanes import LaneSpec
@@ -117,14 +116,15 @@ def _dask_client(address: str, workers: int) -> Iterator[Any]:
         threshold = {"distributed.admin.large-graph-warning-threshold": "1 GB"}
         stack.enter_context(dask.config.set(threshold))
         stack.enter_context(distributed.utils.silence_logging_cmgr(_dask_log_level()))
-        if address == "local":
-            address = stack.enter_context(_local_cluster(workers)).scheduler_address
         try:
+            if address == "local":
+                cluster = stack.enter_context(_local_cluster(workers))
+                address = cluster.scheduler_address
             client = distributed.Client(address, set_as_default=False)
             stack.enter_context(client)
             client.wait_for_workers(1, timeout=WAIT_FOR_WORKERS_S)
-        except (OSError, TimeoutError) as error:
-            raise OutputError(f"no Dask workers at {address}: {error}") from error
+        except (OSError, TimeoutError, RuntimeError) as error:
+            raise SettingsError(f"no Dask workers at {address}: {error}") from error
         yield client
 
 
