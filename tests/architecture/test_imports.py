@@ -18,7 +18,7 @@ LEVELS = {
     "cell": 1, "sampling": 1, "maps": 1, "cells": 1,
     "core": 2,
     "scans": 3, "placement": 3, "ranking": 3, "plots": 3, "view": 3, "report": 3,
-    "validation": 3,
+    "validation": 3, "report": 3,
     "tools": 4,
     "cli": 5, "__main__": 6,
 }  # fmt: skip
