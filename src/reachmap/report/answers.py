@@ -1,0 +1,124 @@
+"""The headline: the questions of a cell designer, each with its answer or its absence."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from reachmap.maps.placement_summary import summarise_placement
+from reachmap.maps.statistics import best_level, level_means, saturation_of
+from reachmap.report.folder import RunFolder
+from reachmap.report.markup import Html, element, joined, paragraph
+from reachmap.report.numbers import count, interval, number, percent, signed
+
+FIRST_PICKS = 3
+
+
+def headline_answers(run: RunFolder) -> Html:
+    """Tiles: best level, bin, share of test grasps, first picks."""
+    tiles = (_level(run), _bin(run), _share(run), _picks(run))
+    return element("div", joined(tiles), class_="answers")
+
+
+def _tile(question: str, reply: str, *why: str) -> Html:
+    return element(
+        "div",
+        paragraph(question, kind="question"),
+        paragraph(reply, kind="reply"),
+        *(paragraph(line, kind="why") for line in why if line),
+        class_="answer",
+    )
+
+
+def _absent(question: str, why: str) -> Html:
+    return element(
+        "div",
+        paragraph(question, kind="question"),
+        paragraph("not known yet", kind="reply"),
+        paragraph(why, kind="why"),
+        class_="answer absent",
+    )
+
+
+def _level(run: RunFolder) -> Html:
+    question = "Which height does the arm reach best?"
+    if run.workspace is None:
+        return _absent(question, "There is no workspace map in this folder.")
+    reached = run.workspace.path_reachability
+    best = best_level(reached)
+    if best is None:
+        return _absent(question, "No test frame of the workspace map was attempted.")
+    mean = float(level_means(reached)[best])
+    full = int((reached[best] == 100.0).sum())
+    known = int((~np.isnan(reached[best])).sum())
+    return _tile(
+        question,
+        f"z = {signed(float(run.workspace.z[best]), 2, 'm')}",
+        f"{percent(mean)} of the tool orientations on average, "
+        f"and all of them at {full} of {count(known, 'square')}.",
+    )
+
+
+def _bin(run: RunFolder) -> Html:
+    question = "Where does the bin go?"
+    if run.placement is None:
+        return _absent(question, "There is no placement in this folder.")
+    summary = summarise_placement(run.placement)
+    chosen, rival = summary.chosen, summary.runner_up
+    place = (
+        f"x {signed(chosen.x, 3)}, y {signed(chosen.y, 3)}, z {signed(chosen.z, 3)} m"
+    )
+    lead = ""
+    if rival is not None:
+        lead = f"The runner-up reaches {percent(rival.score)}."
+    slack = {k: v for k, v in summary.margin.items() if "yaw" not in k}
+    room = ""
+    if slack:
+        room = f"It may be {number(1000 * min(slack.values()), 0)} mm off before "
+        room += "that drops by 5 points."
+    return _tile(
+        question,
+        place,
+        f"Turned by {number(chosen.yaw_deg, 0)}°. {percent(chosen.score)} of the tool "
+        f"orientations over the pick volume. {lead}",
+        room,
+    )
+
+
+def _share(run: RunFolder) -> Html:
+    question = "How much of the bin is really reached?"
+    if run.bin_map is None:
+        return _absent(question, "There is no bin map in this folder.")
+    found = saturation_of(run.bin_map)
+    attempts = len(found.attempts)
+    return _tile(
+        question,
+        percent(float(found.share[-1])),
+        f"{int(found.hits[-1])} of {count(found.total, 'test grasp')} after "
+        f"{count(attempts, 'attempt')} each "
+        f"(95 % interval {interval(float(found.low[-1]), float(found.high[-1]))}).",
+        f"After one attempt: {percent(float(found.share[0]))}." if attempts > 1 else "",
+    )
+
+
+def _picks(run: RunFolder) -> Html:
+    question = "Which grasps come first?"
+    if not run.ranked:
+        return _absent(question, "There is no ranked grasp list in this folder.")
+    grasps = run.ranked[0]["grasps"]
+    said = [(grasp, grasp.get("reachmap") or {}) for grasp in grasps]
+    reachable = [(g, r) for g, r in said if r.get("cost") is not None]
+    if not reachable:
+        return _tile(
+            question, "none", f"None of {count(len(grasps), 'grasp')} is reached."
+        )
+    names = [
+        str(grasp.get("id", f"no. {result.get('original_rank', '?')}"))
+        for grasp, result in reachable[:FIRST_PICKS]
+    ]
+    costs = [float(result["cost"]) for _, result in reachable[:FIRST_PICKS]]
+    return _tile(
+        question,
+        ", ".join(names),
+        f"With cost J = {', '.join(number(cost, 2) for cost in costs)}. "
+        f"{len(reachable)} of {count(len(grasps), 'supplied grasp')} are reached.",
+    )

@@ -1,0 +1,65 @@
+"""The section on failures: states of the test frames, and what is in the way."""
+
+from __future__ import annotations
+
+from reachmap.maps.records import BinMap, WorkspaceMap
+from reachmap.maps.statistics import STATUS_NAMES, Causes, causes_of
+from reachmap.plots.causes import draw_causes
+from reachmap.report.drawing import drawn
+from reachmap.report.markup import Html, element, joined, paragraph, section, table
+from reachmap.report.numbers import percent
+
+PAIRS_SHOWN = 8
+
+
+def cause_section(maps: dict[str, WorkspaceMap | BinMap]) -> Html:
+    """Say of each map why its test frames are not reached.
+
+    Parameters
+    ----------
+    maps : mapping
+        Heading to map.
+    """
+    parts = []
+    for name, record in maps.items():
+        causes = causes_of(record)
+        parts += [
+            element("h3", name),
+            paragraph(_words(causes)),
+            drawn(draw_causes(record), f"{name}: states and causes.", record),
+            element("div", _states(causes), _pairs(causes), class_="pair"),
+        ]
+    return section(
+        "causes",
+        "Why the rest is not reached",
+        paragraph(
+            "A pose with no solution is out of the arm's reach. Where every solution is in "
+            "collision, the two bodies named stand in the way: a slimmer housing, a lower "
+            "wall or another place would free it. Where no path was found, poses are free "
+            "but the planner did not get there with the effort that is stored below."
+        ),
+        joined(parts),
+    )
+
+
+def _words(causes: Causes) -> str:
+    if not causes.pairs:
+        return "No pair of bodies blocks a pose."
+    pair, blocked = causes.pairs[0]
+    share = 100.0 * blocked / max(causes.total, 1)
+    return f"Most often in the way: {' against '.join(pair.split(' | '))} ({percent(share)} of the poses)."
+
+
+def _states(causes: Causes) -> Html:
+    rows = [
+        (STATUS_NAMES[code], count, percent(100.0 * count / max(causes.total, 1)))
+        for code, count in causes.states.items()
+    ]
+    return table(("state", "poses", "share"), rows, "<>>")
+
+
+def _pairs(causes: Causes) -> Html:
+    if not causes.pairs:
+        return Html("")
+    rows = [(pair.replace(" | ", " – "), n) for pair, n in causes.pairs[:PAIRS_SHOWN]]
+    return table(("bodies in contact", "poses"), rows, "<>")

@@ -1,0 +1,248 @@
+"""The sections on the workspace, the placement and the bin map."""
+
+from __future__ import annotations
+
+from reachmap.maps.bin_summary import MEASURES, BinSummary, summarise_bin
+from reachmap.maps.placement_summary import (
+    CandidateSummary,
+    PlacementSummary,
+    summarise_placement,
+)
+from reachmap.maps.records import BinMap, BinPlacement, WorkspaceMap
+from reachmap.maps.workspace_summary import WorkspaceSummary, summarise_workspace
+from reachmap.plots.approach import draw_approach
+from reachmap.plots.bin_map import draw_costs, draw_reachability
+from reachmap.plots.heatmap import draw_level
+from reachmap.plots.levels import level_names
+from reachmap.plots.overview import draw_overview
+from reachmap.plots.placement import draw_placement
+from reachmap.plots.saturation import draw_saturation
+from reachmap.plots.stack import stack_of
+from reachmap.ranking.costs import grasp_costs
+from reachmap.ranking.settings import RankSettings
+from reachmap.ranking.table import table_from_bin_map
+from reachmap.report.drawing import drawn
+from reachmap.report.markup import Html, element, joined, paragraph, section, table
+from reachmap.report.numbers import count, interval, number, percent, signed
+
+REASONS_SHOWN = 6
+
+
+def workspace_section(record: WorkspaceMap) -> Html:
+    """Levels in numbers, the best one and all of them as pictures."""
+    summary = summarise_workspace(record)
+    stack = stack_of(record, "path")
+    best = summary.best_level
+    pictures = []
+    if best is not None:
+        pictures.append(
+            drawn(
+                draw_level(stack, best),
+                "The best level from above: the share of tool orientations at each "
+                "square that a collision-free path from the scan configuration leads to.",
+                record,
+            )
+        )
+    pictures.append(
+        drawn(draw_overview(stack), "All levels, and the mean of each.", record)
+    )
+    return section(
+        "workspace",
+        "What the arm reaches around its base",
+        paragraph(
+            f"{count(summary.frames, 'tool pose')} were tested. A pose counts as reached "
+            "when a path without any collision leads to it and that path was checked "
+            "again, finely, from end to end. Inverse kinematics alone promises more; "
+            "the difference is what camera, tool and surroundings take away."
+        ),
+        _level_table(summary),
+        joined(pictures),
+    )
+
+
+def _level_table(summary: WorkspaceSummary) -> Html:
+    import numpy as np
+
+    names = level_names(np.array([level.z for level in summary.levels]))
+    rows = []
+    for index in reversed(range(len(summary.levels))):
+        level = summary.levels[index]
+        name = names[index].replace("-", "\N{MINUS SIGN}")
+        mark = element("b", f"{name} (best)") if index == summary.best_level else name
+        rows.append(
+            (
+                mark,
+                percent(level.path_percent),
+                percent(level.ik_free_percent),
+                percent(level.ik_percent),
+                f"{level.full_squares} of {level.squares}",
+            )
+        )
+    head = ("z [m]", "path", "IK free of collision", "IK alone", "squares at 100 %")
+    return table(head, rows, "<>>>>")
+
+
+def placement_section(record: BinPlacement, workspace: WorkspaceMap | None) -> Html:
+    """Chosen pose, its margin and its rivals.
+
+    Parameters
+    ----------
+    record : BinPlacement
+    workspace : WorkspaceMap or None
+        The map it was chosen from, if that is known.
+    """
+    summary = summarise_placement(record)
+    return section(
+        "placement",
+        "Where the bin goes",
+        paragraph(
+            f"{count(summary.candidates, 'pose')} of the bin were considered, "
+            f"{summary.exact} of them with the bin in the scene (rule: {summary.rule}). "
+            "The score is the mean path reachability over the pick volume."
+        ),
+        _candidate_table(summary),
+        element("h3", "Margin"),
+        paragraph(_margin_words(summary)),
+        drawn(
+            draw_placement(record, workspace),
+            "The chosen bin, its rivals, and every place that was considered.",
+            record,
+        ),
+        _excluded(summary),
+    )
+
+
+def _candidate_table(summary: PlacementSummary) -> Html:
+    named = (
+        ("chosen", summary.chosen),
+        ("runner-up", summary.runner_up),
+        ("the paper's rule", summary.paper_choice),
+    )
+    rows = [_candidate_row(name, one) for name, one in named if one is not None]
+    head = ("", "x [m]", "y [m]", "z [m]", "yaw", "score", "worst point", "reachable")
+    words = table(head, rows, "<>>>>>>>")
+    if summary.runner_up is not None:
+        return words
+    return joined([words, paragraph("There is no runner-up.", kind="muted")])
+
+
+def _candidate_row(name: str, one: CandidateSummary) -> tuple[object, ...]:
+    return (
+        element("b", name) if name == "chosen" else name,
+        *(signed(value, 3) for value in (one.x, one.y, one.z)),
+        f"{number(one.yaw_deg, 0)}°",
+        percent(one.score),
+        percent(one.worst_point),
+        percent(one.reachable_share),
+    )
+
+
+def _margin_words(summary: PlacementSummary) -> str:
+    if not summary.margin:
+        return "Not measured."
+    words = [
+        f"{name.replace('-', chr(0x2212))} "
+        + (
+            number(v, 0, "°").replace(" ", "")
+            if "yaw" in name
+            else number(1e3 * v, 0, "mm")
+        )
+        for name, v in summary.margin.items()
+    ]
+    return (
+        "The score stays within 5 points of its best while the bin moves by "
+        f"{', '.join(words)}."
+    )
+
+
+def _excluded(summary: PlacementSummary) -> Html:
+    if not summary.excluded:
+        return Html("")
+    rows = [(reason, number) for reason, number in summary.excluded.items()]
+    return joined(
+        [
+            element("h3", "Why other places are out of the question"),
+            table(("reason", "poses"), rows[:REASONS_SHOWN], "<>"),
+        ]
+    )
+
+
+def bin_section(record: BinMap) -> Html:
+    """Reachability, attempts, costs and approach directions inside the bin."""
+    summary = summarise_bin(record)
+    weights = RankSettings().weights
+    grasps = table_from_bin_map(record)
+    cost = grasp_costs(grasps, weights).reshape(grasps.shape)
+    pictures = []
+    for layer, name in enumerate(level_names(record.layer)):
+        where = f" in the layer {name} m above the bottom" if summary.layers > 1 else ""
+        pictures += [
+            drawn(
+                draw_reachability(record, layer),
+                f"Path reachability at each point{where}.",
+                record,
+            ),
+            drawn(
+                draw_approach(record, layer),
+                f"Which approach directions and rolls work where{where}.",
+                record,
+            ),
+            drawn(
+                draw_costs(record, cost, layer),
+                f"What reaching costs{where}: path, planning, execution, and J.",
+                record,
+            ),
+        ]
+    return section(
+        "bin",
+        "What is reached inside the bin",
+        paragraph(
+            f"{count(summary.grasps, 'test grasp')}, {count(summary.repeats, 'attempt')} "
+            f"at each: {summary.reachable} reached."
+        ),
+        _quadrant_table(summary),
+        joined(pictures),
+        drawn(
+            draw_saturation(record),
+            "How the share grows with the number of attempts; bars are 95 % intervals.",
+            record,
+        ),
+        element("h3", "What a pick takes"),
+        _measure_table(summary),
+    )
+
+
+def _quadrant_table(summary: BinSummary) -> Html:
+    rows = []
+    parts = [(q.name, q.saturation, q.measures) for q in summary.quadrants]
+    for name, found, measures in [
+        *parts,
+        (element("b", "whole bin"), summary.saturation, summary.measures),
+    ]:
+        if found.total:
+            rows.append(
+                (
+                    name,
+                    f"{int(found.hits[-1])} of {found.total}",
+                    percent(float(found.share[-1])),
+                    interval(float(found.low[-1]), float(found.high[-1])),
+                    number(measures["path_length"].mean, 2),
+                    number(1e3 * measures["planning_cpu_time"].mean, 0),
+                    number(measures["execution_time"].mean, 2),
+                )
+            )
+    head = ("quadrant", "reached", "share", "95 % interval", "path [rad]",
+            "planning [ms]", "execution [s]")  # fmt: skip
+    return table(head, rows, "<>>>>>>")
+
+
+def _measure_table(summary: BinSummary) -> Html:
+    rows = [
+        (
+            f"{words} [{unit}]",
+            *(number(v, 3) for v in (s.mean, s.std, s.low, s.median, s.high)),
+        )
+        for name, (words, unit) in MEASURES.items()
+        if (s := summary.measures[name]).count
+    ]
+    return table(("", "mean", "std", "least", "median", "most"), rows, "<>>>>>")

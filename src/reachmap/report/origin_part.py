@@ -1,0 +1,76 @@
+"""The section on settings and provenance: enough to make everything again."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from reachmap.maps.any_file import Artefact, kind_of
+from reachmap.report.folder import RunFolder
+from reachmap.report.markup import Html, element, facts, joined, paragraph, section
+from reachmap.report.numbers import number
+
+
+def origin_section(run: RunFolder) -> Html:
+    """Say of every artefact how it was made."""
+    parts = []
+    for role, record in run.artefacts.items():
+        parts += [element("h3", run.files[role]), _facts(record)]
+    return section(
+        "provenance",
+        "Settings and provenance",
+        paragraph(
+            "Each file keeps the cell, the robot description and all settings it was made "
+            "with. Equal contents have equal hashes on every machine."
+        ),
+        element("div", joined(parts), class_="small"),
+    )
+
+
+def _facts(record: Artefact) -> Html:
+    stamp, kept, run = record.stamp, record.provenance, record.run
+    return facts(
+        [
+            ("kind", f"{kind_of(record).replace('_', ' ')}, {stamp.format_version}"),
+            ("content", element("code", stamp.content_sha256 or "-")),
+            ("cell", element("code", stamp.cell_sha256)),
+            (
+                "made from",
+                element("code", kept.source_sha256) if kept.source_sha256 else "",
+            ),
+            ("overrides", ", ".join(kept.overrides)),
+            ("seed", stamp.seed),
+            ("command", element("code", run.command_line) if run.command_line else ""),
+            ("run", f"{run.started} to {run.finished}" if run.started else ""),
+            ("workers", run.workers if run.started else ""),
+            ("wall time", _seconds(run.wall_s)),
+            ("CPU time", _seconds(run.cpu_s)),
+            ("settings", ", ".join(flat_settings(kept.settings))),
+            ("packages", ", ".join(f"{k} {v}" for k, v in kept.packages.items())),
+        ]
+    )
+
+
+def _seconds(phases: Mapping[str, float]) -> str:
+    return ", ".join(
+        f"{name} {number(value, 1, 's')}" for name, value in phases.items()
+    )
+
+
+def flat_settings(value: Any, prefix: str = "") -> list[str]:
+    """Nested settings as ``key.key = value``; of a list, how long it is.
+
+    Examples
+    --------
+    >>> flat_settings({"planner": {"name": "RRT"}, "pairs": ["a | b", "c | d"]})
+    ['planner.name = RRT', 'pairs: 2']
+    """
+    if isinstance(value, Mapping):
+        return [
+            text
+            for key, item in value.items()
+            for text in flat_settings(item, f"{prefix}.{key}" if prefix else str(key))
+        ]
+    if isinstance(value, list | tuple):
+        return [f"{prefix}: {len(value)}"]
+    return [f"{prefix} = {value}"]

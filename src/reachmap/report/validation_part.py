@@ -1,0 +1,107 @@
+"""The section on the validation: what the map said, and what planning found."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from reachmap.report.markup import Html, element, paragraph, section, table
+from reachmap.report.numbers import NONE, number, percent, signed
+
+SHARES = {
+    "precision": "called reachable, and reached",
+    "recall": "reached, and called reachable",
+    "false_positive_rate": "not reached, but called reachable",
+}
+
+
+def validation_section(facts: Mapping[str, Any]) -> Html:
+    """Figures of a ``validation.json``.
+
+    Parameters
+    ----------
+    facts : mapping
+        As :mod:`reachmap.validation.facts` writes it; what is absent is left out.
+    """
+    lists = [one for one in facts.get("lists", ()) if isinstance(one, dict)]
+    groups = [one for one in facts.get("groups", ()) if isinstance(one, dict)]
+    said = [f"{facts[key]} {words}" for key, words in (
+        ("repeats", "attempts at each grasp"), ("rolls", "rolls where the roll is free"),
+    ) if key in facts]  # fmt: skip
+    cheaper = sum(bool(group.get("cheaper")) for group in groups)
+    return section(
+        "validation",
+        "The map tested against planning",
+        paragraph(
+            "Every grasp was planned to for real, and the outcome compared with what the "
+            f"map had said{': ' if said else ''}{', '.join(said)}. Intervals are "
+            "95 % (Wilson)."
+        ),
+        _list_table(lists),
+        element("h3", "The first grasps in each order, as measured") if groups else "",
+        _group_table(groups) if groups else "",
+        paragraph(
+            f"The re-ranked first grasps are cheaper than the supplied ones in {cheaper} "
+            f"of {len(groups)} groups."
+        )
+        if groups
+        else "",
+    )
+
+
+def _list_table(lists: list[dict[str, Any]]) -> Html:
+    rows = []
+    for one in lists:
+        confusion = _mapping(one, "confusion")
+        rank = _mapping(one, "correlation").get("spearman")
+        rows.append(
+            (
+                str(one.get("list", "")),
+                one.get("grasps", NONE),
+                *(_share_words(_mapping(confusion, name)) for name in SHARES),
+                NONE if rank is None else signed(float(rank), 2),
+            )
+        )
+    head = ("list", "grasps", *SHARES.values(), "order of J (Spearman)")
+    return table(head, rows, "<>>>>>")
+
+
+def _share_words(share: Mapping[str, Any]) -> str:
+    if not share.get("total"):
+        return NONE
+    low, high = (number(100.0 * float(share.get(k) or 0.0), 1) for k in ("low", "high"))
+    return f"{percent(100.0 * float(share['share']))} ({low} to {high})"
+
+
+def _group_table(groups: list[dict[str, Any]]) -> Html:
+    rows = []
+    for group in groups:
+        label: object = str(group.get("group", ""))
+        for name, figures in _mapping(group, "orders").items():
+            if not isinstance(figures, dict):
+                continue
+            rows.append(
+                (
+                    label,
+                    str(name),
+                    f"{figures.get('reached', NONE)} of {figures.get('considered', NONE)}",
+                    number(figures.get("cost"), 3),
+                    number(figures.get("path_length"), 2),
+                    number(_milli(figures.get("planning_time")), 1),
+                    number(figures.get("execution_time"), 2),
+                    number(figures.get("calls_first"), 2),
+                )
+            )
+            label = ""
+    head = ("group", "order", "reached", "J", "path [rad]", "planning [ms]",
+            "execution [s]", "planner calls to the first")  # fmt: skip
+    return table(head, rows, "<<>>>>>>")
+
+
+def _milli(value: Any) -> float | None:
+    return None if value is None else 1e3 * float(value)
+
+
+def _mapping(parent: Mapping[str, Any], key: str) -> Mapping[str, Any]:
+    value = parent.get(key)
+    return value if isinstance(value, dict) else {}

@@ -1,0 +1,53 @@
+"""``reachmap report``: the folder of a run in, one self-contained page out."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from reachmap.cell.loaded import LoadedCell
+from reachmap.errors import CellError
+from reachmap.maps.publish import check_output, publish
+from reachmap.report.folder import RunFolder, read_run_folder
+from reachmap.report.page import report_page
+from reachmap.tools.options import cell_of_artefact
+
+
+def report(folder: Path, *, output: Path, overwrite: bool = False) -> Path:
+    """Write a run as one page that can be sent to somebody.
+
+    Parameters
+    ----------
+    folder : Path
+        With ``workspace.h5``, ``placement.h5``, ``bin.h5``, ``ranked.json`` and
+        ``validation.json``, as far as they exist; the page says what is missing.
+    output : Path
+        Such as ``report.html``.
+    overwrite : bool
+        Replace the page if it exists.
+
+    Returns
+    -------
+    Path
+        Where the page is.
+
+    Raises
+    ------
+    MapFileError
+        There is no artefact in the folder.
+    OutputError
+        The page exists or cannot be written.
+    """
+    check_output(output, overwrite=overwrite)
+    run = read_run_folder(folder)
+    page = report_page(run, _cell(run))
+    publish(output, [page.encode()], overwrite=overwrite)
+    return output
+
+
+def _cell(run: RunFolder) -> LoadedCell | str:
+    """Cell of the run, or why it cannot be loaded: the numbers are worth a page."""
+    role, record = list(run.artefacts.items())[-1]
+    try:
+        return cell_of_artefact(record.provenance, run.files[role])
+    except CellError as error:
+        return error.lines[0]
