@@ -1,4 +1,4 @@
-"""The headline: the questions of a cell designer, each with its answer or its absence."""
+"""The headline: the questions of a cell designer, answered as far as they can be."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def _bin(run: RunFolder) -> Html:
     return _tile(
         question,
         place,
-        f"Turned by {number(chosen.yaw_deg, 0)}°. {percent(chosen.score)} of the tool "
+        f"Metres from robot_base, turned by {number(chosen.yaw_deg, 0)}°. {percent(chosen.score)} of the tool "
         f"orientations over the pick volume. {lead}",
         room,
     )

@@ -33,10 +33,10 @@ def cause_section(maps: dict[str, WorkspaceMap | BinMap]) -> Html:
         "causes",
         "Why the rest is not reached",
         paragraph(
-            "A pose with no solution is out of the arm's reach. Where every solution is in "
-            "collision, the two bodies named stand in the way: a slimmer housing, a lower "
-            "wall or another place would free it. Where no path was found, poses are free "
-            "but the planner did not get there with the effort that is stored below."
+            "A pose with no solution is out of the arm's reach. Where every solution is "
+            "in collision, the two bodies named stand in the way: a slimmer housing, a "
+            "lower wall or another place would free it. Where no path was found, the pose "
+            "is free, but planning did not get there with the effort stored below."
         ),
         joined(parts),
     )
@@ -47,7 +47,8 @@ def _words(causes: Causes) -> str:
         return "No pair of bodies blocks a pose."
     pair, blocked = causes.pairs[0]
     share = 100.0 * blocked / max(causes.total, 1)
-    return f"Most often in the way: {' against '.join(pair.split(' | '))} ({percent(share)} of the poses)."
+    bodies = " against ".join(pair.split(" | "))
+    return f"Most often in the way: {bodies} ({percent(share)} of the poses)."
 
 
 def _states(causes: Causes) -> Html:

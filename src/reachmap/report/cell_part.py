@@ -34,7 +34,6 @@ def cell_section(loaded: LoadedCell | str, record: Artefact) -> Html:
     return section(
         "cell",
         TITLE,
-        paragraph(loaded.cell.description) if loaded.cell.description else "",
         _picture(loaded, record),
         _facts(loaded),
         element("h3", "Bodies"),

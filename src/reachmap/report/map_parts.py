@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from reachmap.maps.bin_summary import MEASURES, BinSummary, summarise_bin
 from reachmap.maps.placement_summary import (
     CandidateSummary,
@@ -23,7 +25,7 @@ from reachmap.ranking.settings import RankSettings
 from reachmap.ranking.table import table_from_bin_map
 from reachmap.report.drawing import drawn
 from reachmap.report.markup import Html, element, joined, paragraph, section, table
-from reachmap.report.numbers import count, interval, number, percent, signed
+from reachmap.report.numbers import MINUS, count, interval, number, percent, signed
 
 REASONS_SHOWN = 6
 
@@ -39,7 +41,7 @@ def workspace_section(record: WorkspaceMap) -> Html:
             drawn(
                 draw_level(stack, best),
                 "The best level from above: the share of tool orientations at each "
-                "square that a collision-free path from the scan configuration leads to.",
+                "square that a collision-free path from the scan configuration reaches.",
                 record,
             )
         )
@@ -50,10 +52,10 @@ def workspace_section(record: WorkspaceMap) -> Html:
         "workspace",
         "What the arm reaches around its base",
         paragraph(
-            f"{count(summary.frames, 'tool pose')} were tested. A pose counts as reached "
-            "when a path without any collision leads to it and that path was checked "
-            "again, finely, from end to end. Inverse kinematics alone promises more; "
-            "the difference is what camera, tool and surroundings take away."
+            f"{count(summary.frames, 'tool pose')} were tested. A pose counts as "
+            "reached when a path without any collision leads to it, and that path was "
+            "checked again, finely, from end to end. Inverse kinematics alone promises "
+            "more; the difference is what camera, tool and surroundings take away."
         ),
         _level_table(summary),
         joined(pictures),
@@ -61,13 +63,11 @@ def workspace_section(record: WorkspaceMap) -> Html:
 
 
 def _level_table(summary: WorkspaceSummary) -> Html:
-    import numpy as np
-
     names = level_names(np.array([level.z for level in summary.levels]))
     rows = []
     for index in reversed(range(len(summary.levels))):
         level = summary.levels[index]
-        name = names[index].replace("-", "\N{MINUS SIGN}")
+        name = names[index].replace("-", MINUS)
         mark = element("b", f"{name} (best)") if index == summary.best_level else name
         rows.append(
             (
@@ -97,7 +97,8 @@ def placement_section(record: BinPlacement, workspace: WorkspaceMap | None) -> H
         "Where the bin goes",
         paragraph(
             f"{count(summary.candidates, 'pose')} of the bin were considered, "
-            f"{summary.exact} of them with the bin in the scene (rule: {summary.rule}). "
+            f"{summary.exact} of them with the bin in the scene (rule: {summary.rule})."
+            " "
             "The score is the mean path reachability over the pick volume."
         ),
         _candidate_table(summary),
@@ -197,8 +198,8 @@ def bin_section(record: BinMap) -> Html:
         "bin",
         "What is reached inside the bin",
         paragraph(
-            f"{count(summary.grasps, 'test grasp')}, {count(summary.repeats, 'attempt')} "
-            f"at each: {summary.reachable} reached."
+            f"{count(summary.grasps, 'test grasp')}, "
+            f"{count(summary.repeats, 'attempt')} at each: {summary.reachable} reached."
         ),
         _quadrant_table(summary),
         joined(pictures),
@@ -237,12 +238,10 @@ def _quadrant_table(summary: BinSummary) -> Html:
 
 
 def _measure_table(summary: BinSummary) -> Html:
-    rows = [
-        (
-            f"{words} [{unit}]",
-            *(number(v, 3) for v in (s.mean, s.std, s.low, s.median, s.high)),
-        )
-        for name, (words, unit) in MEASURES.items()
-        if (s := summary.measures[name]).count
-    ]
+    rows = []
+    for name, (words, unit) in MEASURES.items():
+        spread = summary.measures[name]
+        if spread.count:
+            values = (spread.mean, spread.std, spread.low, spread.median, spread.high)
+            rows.append((f"{words} [{unit}]", *(number(v, 3) for v in values)))
     return table(("", "mean", "std", "least", "median", "most"), rows, "<>>>>>")

@@ -1,4 +1,4 @@
-"""HTML in small pieces. Every text that comes in is escaped; there is no other way in."""
+"""HTML in small pieces. Every text that comes in is escaped; there is no way round."""
 
 from __future__ import annotations
 

@@ -20,8 +20,8 @@ def origin_section(run: RunFolder) -> Html:
         "provenance",
         "Settings and provenance",
         paragraph(
-            "Each file keeps the cell, the robot description and all settings it was made "
-            "with. Equal contents have equal hashes on every machine."
+            "Each file keeps the cell, the robot description and all settings it was "
+            "made with. Equal contents have equal hashes on every machine."
         ),
         element("div", joined(parts), class_="small"),
     )
@@ -40,7 +40,7 @@ def _facts(record: Artefact) -> Html:
             ),
             ("overrides", ", ".join(kept.overrides)),
             ("seed", stamp.seed),
-            ("command", element("code", run.command_line) if run.command_line else ""),
+            ("command", _code(_command(run.command_line))),
             ("run", f"{run.started} to {run.finished}" if run.started else ""),
             ("workers", run.workers if run.started else ""),
             ("wall time", _seconds(run.wall_s)),
@@ -73,4 +73,6 @@ def flat_settings(value: Any, prefix: str = "") -> list[str]:
         ]
     if isinstance(value, list | tuple):
         return [f"{prefix}: {len(value)}"]
-    return [f"{prefix} = {value}"]
+    words = {True: "yes", False: "no", None: "none"}
+    said = words[value] if value is None or isinstance(value, bool) else value
+    return [f"{prefix} = {said}"]

@@ -72,8 +72,8 @@ def report_page(run: RunFolder, cell: LoadedCell | str) -> str:
                 "footer",
                 f"Made by reachmap {__version__} from the files of the folder ",
                 element("b", run.name),
-                ". Percentages are shares of tested tool orientations; lengths in metres "
-                "in robot_base unless said otherwise.",
+                ". Percentages are shares of tested tool orientations; lengths are in "
+                "metres, in robot_base unless said otherwise.",
             ),
         ]
     )

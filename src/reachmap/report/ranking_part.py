@@ -92,7 +92,7 @@ def _groups(document: Mapping[str, Any], name: str) -> list[CostGroup]:
     """Costs by quadrant, or of the whole list if it names none."""
     results = _results(document)
     quadrants = {str(g["quadrant"]) for g, _ in results if g.get("quadrant")}
-    wanted = [q for q in QUADRANT_ORDER if q in quadrants] or [None]
+    wanted: list[str | None] = [q for q in QUADRANT_ORDER if q in quadrants]
     groups = []
     for quadrant in wanted:
         own = [
@@ -109,8 +109,8 @@ def _groups(document: Mapping[str, Any], name: str) -> list[CostGroup]:
 
 def _terms(results: Sequence[Mapping[str, Any]]) -> FloatArray:
     """Terms of J, shape (n, 3) or (n, 4) with likeness; NaN where unreachable."""
-    names = [n for n in TERM_NAMES if any(n in (r.get("terms") or {}) for r in results)]
-    names = names or list(TERM_NAMES[:3])
+    found = {name for result in results for name in result.get("terms") or {}}
+    names = TERM_NAMES if TERM_NAMES[3] in found else TERM_NAMES[:3]
     return np.array(
         [
             [float((result.get("terms") or {}).get(name, np.nan)) for name in names]

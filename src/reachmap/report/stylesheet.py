@@ -37,7 +37,7 @@ nav a { margin-right: 18px; white-space: nowrap; }
 }
 .answer .question { color: var(--muted); font-size: 13px; margin: 0; }
 .answer .reply {
-  font-size: 23px; font-weight: 650; line-height: 1.25; margin: 3px 0 6px;
+  font-size: 22px; font-weight: 650; line-height: 1.25; margin: 3px 0 6px;
 }
 .answer .why { font-size: 13.5px; margin: 0; color: #3a3a3a; }
 .absent { border-top-color: #b5b5b5; }

@@ -25,24 +25,25 @@ def validation_section(facts: Mapping[str, Any]) -> Html:
     """
     lists = [one for one in facts.get("lists", ()) if isinstance(one, dict)]
     groups = [one for one in facts.get("groups", ()) if isinstance(one, dict)]
-    said = [f"{facts[key]} {words}" for key, words in (
-        ("repeats", "attempts at each grasp"), ("rolls", "rolls where the roll is free"),
-    ) if key in facts]  # fmt: skip
+    words = {"repeats": "attempts at each", "rolls": "rolls where the roll is free"}
+    said = ", ".join(
+        f"{facts[key]} {name}" for key, name in words.items() if key in facts
+    )
     cheaper = sum(bool(group.get("cheaper")) for group in groups)
     return section(
         "validation",
         "The map tested against planning",
         paragraph(
-            "Every grasp was planned to for real, and the outcome compared with what the "
-            f"map had said{': ' if said else ''}{', '.join(said)}. Intervals are "
-            "95 % (Wilson)."
+            "Every grasp was planned to for real, and the outcome compared with what "
+            f"the map had said{f' ({said})' if said else ''}. Intervals are 95 % "
+            "(Wilson)."
         ),
         _list_table(lists),
         element("h3", "The first grasps in each order, as measured") if groups else "",
         _group_table(groups) if groups else "",
         paragraph(
-            f"The re-ranked first grasps are cheaper than the supplied ones in {cheaper} "
-            f"of {len(groups)} groups."
+            "The re-ranked first grasps are cheaper than the supplied ones in "
+            f"{cheaper} of {len(groups)} groups."
         )
         if groups
         else "",
@@ -84,7 +85,9 @@ def _group_table(groups: list[dict[str, Any]]) -> Html:
                 (
                     label,
                     str(name),
-                    f"{figures.get('reached', NONE)} of {figures.get('considered', NONE)}",
+                    " of ".join(
+                        str(figures.get(key, NONE)) for key in ("reached", "considered")
+                    ),
                     number(figures.get("cost"), 3),
                     number(figures.get("path_length"), 2),
                     number(_milli(figures.get("planning_time")), 1),
