@@ -122,7 +122,7 @@ def rank(
     _check_request(sources, top, chart_top)
     targets = check_targets(sources, output, overwrite=overwrite)
     _check_chart(chart, overwrite=overwrite)
-    lists = [_read(source, list_format) for source in sources]
+    lists = [read_list(source, list_format) for source in sources]
     bin_map = read_bin_map(Path(map_path))
     if cell is not None:
         _check_cell(bin_map, map_path, cell, overrides, force=force)
@@ -188,7 +188,8 @@ def _check_cell(
     logger.warning("%s", message)
 
 
-def _read(source: str | Path, list_format: ListFormat) -> GraspList:
+def read_list(source: str | Path, list_format: ListFormat) -> GraspList:
+    """Read a grasp list; what is doubtful about it is logged."""
     # With a pose the frame needs no name that the cell knows.
     frame = list_format.frame
     if frame is None and list_format.frame_pose is not None:

@@ -1,0 +1,291 @@
+"""``reachmap validate``: a bin map and grasps in, how well it predicted out."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from reachmap.core.scene import Scene
+from reachmap.errors import GraspListError, SettingsError
+from reachmap.maps import read_bin_map
+from reachmap.maps.publish import check_output, publish
+from reachmap.maps.records import BinMap
+from reachmap.ranking.grasps import STDIN
+from reachmap.ranking.pipeline import pose_from_numbers, rank_list
+from reachmap.ranking.ranked_list import RankedList
+from reachmap.ranking.ranker import Ranker
+from reachmap.ranking.settings import RankSettings
+from reachmap.scans.progress import Progress
+from reachmap.tools.options import IN_PROCESS, RunOptions, cell_of_artefact
+from reachmap.tools.rank import ListFormat, read_list
+from reachmap.tools.validate_text import validation_text
+from reachmap.validation.facts import facts_of
+from reachmap.validation.judgement import judge_list
+from reachmap.validation.picks import NO_PICKS, join_picks, picks_of
+from reachmap.validation.planning import PickContext, PickResults, plan_picks
+from reachmap.validation.random_grasps import random_grasps
+from reachmap.validation.summary import Validation, summarise
+
+DEFAULT_ROLLS = 24
+MAX_ROLLS, MAX_REPEATS = 360, 255
+CHART_SUFFIXES = (".png", ".svg")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PickOptions:
+    """How grasps are planned to.
+
+    Attributes
+    ----------
+    rolls : int
+        Steps of the tool's full turn that a grasp with a free roll is tried at.
+    repeats : int or None
+        Attempts at each grasp; None takes the map's.
+    seed : int or None
+        Of attempts and of random grasps; None takes the map's.
+    overrides : sequence of str
+        Changes to the map's cell, as in ``planner.name=RRTConnect``.
+    """
+
+    rolls: int = DEFAULT_ROLLS
+    repeats: int | None = None
+    seed: int | None = None
+    overrides: Sequence[str] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ValidateAnswer:
+    """What a validation gives back.
+
+    Attributes
+    ----------
+    validation : Validation
+    facts : mapping
+        Its summary as JSON values.
+    text : str
+        The same as tables.
+    """
+
+    validation: Validation
+    facts: dict[str, Any]
+    text: str
+
+
+def validate(
+    map_path: str | Path,
+    sources: Sequence[str | Path] = (),
+    *,
+    random: int | None = None,
+    settings: RankSettings | None = None,
+    list_format: ListFormat | None = None,
+    pick: PickOptions | None = None,
+    top: int = 10,
+    output: Path | None = None,
+    chart: Path | None = None,
+    run: RunOptions = IN_PROCESS,
+) -> ValidateAnswer:
+    """Rank grasps with a map, plan to each of them, and compare.
+
+    Parameters
+    ----------
+    map_path : path
+        A bin map; the cell it was made from is in it.
+    sources : sequence of path
+        Grasp lists; ``-`` is standard input.
+    random : int, optional
+        So many grasps drawn from the mapped volume, as a list of their own.
+    settings : RankSettings, optional
+    list_format : ListFormat, optional
+    pick : PickOptions, optional
+    top : int
+        How many of the first grasps of each order are compared.
+    output : Path, optional
+        A JSON file of the summary and every grasp.
+    chart : Path, optional
+        A picture (.png or .svg).
+    run : RunOptions
+        Its shard and restart do not apply.
+
+    Raises
+    ------
+    ReachmapError
+        See :mod:`reachmap.errors`.
+    """
+    settings, pick = settings or RankSettings(), pick or PickOptions()
+    _check_request(sources, random, pick, top)
+    _check_places(sources, map_path, output, chart, overwrite=run.overwrite)
+    bin_map = read_bin_map(Path(map_path))
+    ranker = Ranker(bin_map)
+    context = _context(bin_map, str(map_path), pick)
+    ranked = [
+        _rank(source, ranker, settings, list_format or ListFormat())
+        for source in sources
+    ]
+    if random is not None:
+        drawn = random_grasps(bin_map, random, context.seed)
+        ranked.append(rank_list(drawn, ranker, settings=settings))
+    context = replace(context, picks=join_picks([picks_of(one) for one in ranked]))
+    if not len(context.picks):
+        raise GraspListError("there are no grasps to plan to")
+    scene = Scene.build(context.loaded, with_bin=True)
+    scene.require_free_scan_configuration()
+    results = plan_picks(
+        context,
+        workers=run.workers,
+        executor=run.executor,
+        progress=Progress("validate", quiet=run.quiet),
+    )
+    validation = summarise(
+        [
+            judge_list(label, one, ranker, bin_map, part)
+            for label, one, part in zip(
+                _labels(ranked), ranked, _split(results, ranked), strict=True
+            )
+        ],
+        top=top,
+        settings=_facts_of_settings(map_path, bin_map, settings, context, top),
+    )
+    _write(validation, output, chart, scene.checker.body_pairs, run.overwrite)
+    return ValidateAnswer(
+        validation=validation,
+        facts=facts_of(validation),
+        text=validation_text(validation),
+    )
+
+
+def _context(bin_map: BinMap, map_name: str, pick: PickOptions) -> PickContext:
+    """How to plan, with no grasps yet."""
+    return PickContext(
+        loaded=cell_of_artefact(bin_map.provenance, map_name, pick.overrides),
+        picks=NO_PICKS,
+        rolls=pick.rolls,
+        repeats=pick.repeats or bin_map.path_found.shape[-1],
+        seed=bin_map.stamp.seed if pick.seed is None else pick.seed,
+    )
+
+
+def _rank(
+    source: str | Path,
+    ranker: Ranker,
+    settings: RankSettings,
+    list_format: ListFormat,
+) -> RankedList:
+    numbers = list_format.frame_pose
+    return rank_list(
+        read_list(source, list_format),
+        ranker,
+        settings=settings,
+        T_base_frame=None if numbers is None else pose_from_numbers(numbers),
+    )
+
+
+def _check_request(
+    sources: Sequence[str | Path], random: int | None, pick: PickOptions, top: int
+) -> None:
+    if not sources and random is None:
+        raise SettingsError("name a grasp list, or draw grasps with --random N")
+    if sum(str(source) == STDIN for source in sources) > 1:
+        raise SettingsError("standard input can be read once")
+    bounded = (
+        ("rolls", pick.rolls, MAX_ROLLS),
+        ("repeats", 1 if pick.repeats is None else pick.repeats, MAX_REPEATS),
+    )
+    for name, value, most in bounded:
+        if not 1 <= value <= most:
+            raise SettingsError(f"{name} must be 1 to {most} (got {value})")
+    if top < 1:
+        raise SettingsError(f"top must be 1 or more (got {top})")
+
+
+def _check_places(
+    sources: Sequence[str | Path],
+    map_path: str | Path,
+    output: Path | None,
+    chart: Path | None,
+    *,
+    overwrite: bool,
+) -> None:
+    """Refuse places before an hour of planning is spent."""
+    if chart is not None and chart.suffix not in CHART_SUFFIXES:
+        raise SettingsError(f"{chart}: a chart is a .png or an .svg")
+    inputs = {Path(source).resolve() for source in (*sources, map_path)}
+    for target in (output, chart):
+        if target is None:
+            continue
+        if target.resolve() in inputs:
+            raise SettingsError(f"{target}: would replace an input")
+        check_output(target, overwrite=overwrite)
+    if output is not None and chart is not None and output == chart:
+        raise SettingsError(f"{output}: results and chart need two files")
+
+
+def _labels(ranked: Sequence[RankedList]) -> list[str]:
+    """Short names of lists, numbered where two are the same."""
+    names = [Path(one.grasps.source).stem for one in ranked]
+    return [
+        f"{name} ({names[: k + 1].count(name)})" if names.count(name) > 1 else name
+        for k, name in enumerate(names)
+    ]
+
+
+def _split(results: PickResults, ranked: Sequence[RankedList]) -> list[PickResults]:
+    parts, begin = [], 0
+    for one in ranked:
+        parts.append(results.take(slice(begin, begin + len(one.grasps))))
+        begin += len(one.grasps)
+    return parts
+
+
+def _facts_of_settings(
+    map_path: str | Path,
+    bin_map: BinMap,
+    settings: RankSettings,
+    context: PickContext,
+    top: int,
+) -> dict[str, Any]:
+    cell = context.loaded.cell
+    return {
+        "map": str(map_path),
+        "map_sha256": bin_map.stamp.content_sha256,
+        "cell_sha256": context.loaded.sha256,
+        "cell": cell.name,
+        "test_grasps": bin_map.status.size,
+        "map_repeats": bin_map.path_found.shape[-1],
+        "planner": cell.planner.name,
+        "approach_distance_m": cell.bin_scan.approach_distance_m,
+        "weights": list(settings.weights),
+        "likeness": settings.likeness,
+        "neighbours": settings.neighbours,
+        "roll": settings.roll,
+        "rolls": context.rolls,
+        "repeats": context.repeats,
+        "seed": context.seed,
+        "top": top,
+    }
+
+
+def _write(
+    validation: Validation,
+    output: Path | None,
+    chart: Path | None,
+    body_pairs: tuple[str, ...],
+    overwrite: bool,
+) -> None:
+    if output is not None:
+        text = json.dumps(facts_of(validation, body_pairs), indent=1, allow_nan=False)
+        publish(output, [text.encode("ascii"), b"\n"], overwrite=overwrite)
+    if chart is not None:
+        # Imported here: drawing is asked for seldom.
+        from reachmap.plots.style import figure_bytes
+        from reachmap.plots.validation import validation_chart
+
+        data = figure_bytes(
+            validation_chart(validation),
+            "svg" if chart.suffix == ".svg" else "png",
+            title="Predicted by the map and found by planning",
+            config_sha256=str(validation.settings["map_sha256"]),
+        )
+        publish(chart, [data], overwrite=overwrite)

@@ -1,0 +1,63 @@
+"""The chart of a validation shows the numbers of its summary."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+
+import numpy as np
+import pytest
+from toy_truth import clear_rows, toy_grasps
+
+from reachmap.errors import SettingsError
+from reachmap.plots.validation import validation_chart
+from reachmap.tools.validate import validate
+
+
+@pytest.fixture(scope="module")
+def validation(toy_map, tmp_path_factory):
+    """Thirty toy grasps, some of them wrongly called reachable."""
+    path = tmp_path_factory.mktemp("chart") / "toy.json"
+    path.write_text(json.dumps(toy_grasps(clear_rows(30, seed=1))))
+    return validate(toy_map, [path], top=5).validation
+
+
+def test_bars_are_measured_means(validation):
+    """Three segments for each order of each group; grey where one was not reached."""
+    _, bars = validation_chart(validation).axes
+    heights = {
+        round(p.get_x() + p.get_width() / 2, 6): 0.0
+        for p in bars.patches
+        if p.get_facecolor()[:3] != bars.patches[0].get_facecolor()[:3]
+    }
+    coloured = [p for p in bars.patches if p.get_y() > 0 or p.get_height() < 0.99 *
+                bars.get_ylim()[1]]  # fmt: skip
+    for patch in coloured:
+        place = round(patch.get_x() + patch.get_width() / 2, 6)
+        heights[place] = heights.get(place, 0.0) + patch.get_height()
+    expected = [
+        np.nan_to_num(figures.cost)
+        for group in validation.groups
+        for figures in group.orders.values()
+    ]
+    drawn = [heights[place] for place in sorted(heights)]
+    np.testing.assert_allclose(drawn, expected)
+
+
+def test_points_are_grasps(validation):
+    """Reached grasps at their costs, the others as crosses on the upper edge."""
+    costs, _ = validation_chart(validation).axes
+    (one,) = validation.lists
+    reached, missed = (c.get_offsets() for c in costs.collections)
+    both = one.predicted & one.reached
+    np.testing.assert_allclose(reached[:, 0], one.predicted_cost[both])
+    np.testing.assert_allclose(reached[:, 1], one.cost[both])
+    assert len(missed) == validation.overall.confusion.false_positive > 0
+    assert (np.asarray(missed)[:, 1] == costs.get_ylim()[1]).all()
+
+
+def test_too_many_groups_are_refused(validation):
+    """A page has room for twenty-four quadrants."""
+    many = dataclasses.replace(validation, groups=validation.groups * 10)
+    with pytest.raises(SettingsError, match="groups; a chart takes 24"):
+        validation_chart(many)
