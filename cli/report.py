@@ -18,9 +18,10 @@ def command(folder: Path, output: Path, overwrite: bool) -> None:
 
     FOLDER holds workspace.h5, placement.h5, bin.h5, ranked.json and validation.json,
     or some of them; the page says what is missing. It answers where the bin goes, how
-    much of it is reached and which grasps come first, shows the cell and the maps, names
-    what stands in the way, and lists settings and provenance. Pictures are inside the
-    page, which asks for nothing from the network and prints well. Its name is printed.
+    much of it is reached and which grasps come first, shows the cell and the maps,
+    names what stands in the way, and lists settings and provenance. Pictures are inside
+    the page, which asks for nothing from the network and prints well. Its name is
+    printed.
 
     Example: reachmap report run -o report.html
     """

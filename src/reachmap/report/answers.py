@@ -64,8 +64,9 @@ def _bin(run: RunFolder) -> Html:
         return _absent(question, "There is no placement in this folder.")
     summary = summarise_placement(run.placement)
     chosen, rival = summary.chosen, summary.runner_up
-    place = (
-        f"x {signed(chosen.x, 3)}, y {signed(chosen.y, 3)}, z {signed(chosen.z, 3)} m"
+    place = ", ".join(
+        f"{axis}\N{NO-BREAK SPACE}{signed(value, 3)}"
+        for axis, value in zip("xyz", (chosen.x, chosen.y, chosen.z), strict=True)
     )
     lead = ""
     if rival is not None:
@@ -78,8 +79,8 @@ def _bin(run: RunFolder) -> Html:
     return _tile(
         question,
         place,
-        f"Metres from robot_base, turned by {number(chosen.yaw_deg, 0)}°. {percent(chosen.score)} of the tool "
-        f"orientations over the pick volume. {lead}",
+        f"Metres from robot_base, turned by {number(chosen.yaw_deg, 0)}°. "
+        f"{percent(chosen.score)} of the tool orientations over the pick volume. {lead}",
         room,
     )
 

@@ -41,7 +41,7 @@ def workspace_section(record: WorkspaceMap) -> Html:
             drawn(
                 draw_level(stack, best),
                 "The best level from above: the share of tool orientations at each "
-                "square that a collision-free path from the scan configuration reaches.",
+                "square that a collision-free path from the scan pose reaches.",
                 record,
             )
         )
@@ -142,12 +142,8 @@ def _margin_words(summary: PlacementSummary) -> str:
     if not summary.margin:
         return "Not measured."
     words = [
-        f"{name.replace('-', chr(0x2212))} "
-        + (
-            number(v, 0, "°").replace(" ", "")
-            if "yaw" in name
-            else number(1e3 * v, 0, "mm")
-        )
+        f"{name.replace('-', MINUS)} "
+        + (f"{number(v, 0)}°" if "yaw" in name else number(1e3 * v, 0, "mm"))
         for name, v in summary.margin.items()
     ]
     return (

@@ -34,10 +34,7 @@ def _facts(record: Artefact) -> Html:
             ("kind", f"{kind_of(record).replace('_', ' ')}, {stamp.format_version}"),
             ("content", element("code", stamp.content_sha256 or "-")),
             ("cell", element("code", stamp.cell_sha256)),
-            (
-                "made from",
-                element("code", kept.source_sha256) if kept.source_sha256 else "",
-            ),
+            ("made from", _code(kept.source_sha256)),
             ("overrides", ", ".join(kept.overrides)),
             ("seed", stamp.seed),
             ("command", _code(_command(run.command_line))),
@@ -55,6 +52,16 @@ def _seconds(phases: Mapping[str, float]) -> str:
     return ", ".join(
         f"{name} {number(value, 1, 's')}" for name, value in phases.items()
     )
+
+
+def _code(value: str) -> Html:
+    return element("code", value) if value else Html("")
+
+
+def _command(line: str) -> str:
+    """Command without the folder that the program lies in."""
+    program, _, rest = line.partition(" ")
+    return f"{program.rsplit('/', 1)[-1]} {rest}".strip()
 
 
 def flat_settings(value: Any, prefix: str = "") -> list[str]:

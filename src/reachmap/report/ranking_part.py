@@ -91,16 +91,14 @@ def _table(document: Mapping[str, Any]) -> Html:
 def _groups(document: Mapping[str, Any], name: str) -> list[CostGroup]:
     """Costs by quadrant, or of the whole list if it names none."""
     results = _results(document)
-    quadrants = {str(g["quadrant"]) for g, _ in results if g.get("quadrant")}
-    wanted: list[str | None] = [q for q in QUADRANT_ORDER if q in quadrants]
+    several = any(grasp.get("quadrant") for grasp, _ in results)
+    rest = "other" if several else "" if name else "all"
     groups = []
-    for quadrant in wanted:
-        own = [
-            r for g, r in results if quadrant is None or g.get("quadrant") == quadrant
-        ]
+    for quadrant in QUADRANT_ORDER:
+        own = [r for g, r in results if (g.get("quadrant") or None) == quadrant]
         supplied = sorted(own, key=lambda result: int(result.get("original_rank", 0)))
         if own:
-            label = f"{name} {quadrant or ''}".strip() or "all"
+            label = f"{name} {quadrant or rest}".strip()
             groups.append(
                 CostGroup(label=label, supplied=_terms(supplied), ranked=_terms(own))
             )
