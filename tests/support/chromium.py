@@ -72,7 +72,9 @@ class Page:
 
     def evaluate(self, expression: str) -> Any:
         """Value of a JavaScript expression."""
-        answer = self.call("Runtime.evaluate", expression=expression, returnByValue=True)
+        answer = self.call(
+            "Runtime.evaluate", expression=expression, returnByValue=True
+        )
         return answer["result"].get("value")
 
     def png(self, *, whole: bool = False) -> bytes:

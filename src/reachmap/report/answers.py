@@ -80,7 +80,7 @@ def _bin(run: RunFolder) -> Html:
         question,
         place,
         f"Metres from robot_base, turned by {number(chosen.yaw_deg, 0)}°. "
-        f"{percent(chosen.score)} of the tool orientations over the pick volume. {lead}",
+        f"{percent(chosen.score)} of the tool orientations in the pick volume. {lead}",
         room,
     )
 

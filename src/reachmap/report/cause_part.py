@@ -34,8 +34,8 @@ def cause_section(maps: dict[str, WorkspaceMap | BinMap]) -> Html:
         "Why the rest is not reached",
         paragraph(
             "A pose with no solution is out of the arm's reach. Where every solution "
-            "is in collision, the two bodies named stand in the way: a slimmer housing, "
-            "a lower wall or another place would free it. Where no path was found, the "
+            "collides, the two bodies named stand in the way: a slimmer housing, a "
+            "lower wall or another place would free it. Where no path was found, the "
             "pose is free, but planning did not get there with the effort stored below."
         ),
         joined(parts),

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from matplotlib.figure import Figure
+from typing import TYPE_CHECKING
 
 from reachmap.maps.any_file import Artefact
 from reachmap.plots.style import figure_bytes
 from reachmap.report.markup import Html, picture
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 def drawn(figure: Figure, caption: str, record: Artefact) -> Html:

@@ -96,10 +96,9 @@ def placement_section(record: BinPlacement, workspace: WorkspaceMap | None) -> H
         "placement",
         "Where the bin goes",
         paragraph(
-            f"{count(summary.candidates, 'pose')} of the bin were considered, "
-            f"{summary.exact} of them with the bin in the scene (rule: {summary.rule})."
-            " "
-            "The score is the mean path reachability over the pick volume."
+            f"Considered: {count(summary.candidates, 'pose')} of the bin, "
+            f"{summary.exact} with the bin in the scene (rule: {summary.rule}). The "
+            "score is the mean path reachability over the pick volume."
         ),
         _candidate_table(summary),
         element("h3", "Margin"),

@@ -61,9 +61,9 @@ th {
 td {
   padding: 4px 18px 4px 0; border-bottom: 1px solid #ececec; vertical-align: top;
 }
-td.n, th.n {
-  text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap;
-}
+td.n, th.n { text-align: right; font-variant-numeric: tabular-nums; }
+td.n { white-space: nowrap; }
+th.n { max-width: 132px; }
 tr.best td { background: #eef3fd; font-weight: 600; }
 .facts td:first-child { white-space: nowrap; color: #333; }
 .facts b { font-weight: 600; }

@@ -27,7 +27,7 @@ def validation_section(facts: Mapping[str, Any]) -> Html:
     groups = [one for one in facts.get("groups", ()) if isinstance(one, dict)]
     words = {"repeats": "attempts at each", "rolls": "rolls where the roll is free"}
     said = ", ".join(
-        f"{facts[key]} {name}" for key, name in words.items() if key in facts
+        f"{name}: {facts[key]}" for key, name in words.items() if key in facts
     )
     cheaper = sum(bool(group.get("cheaper")) for group in groups)
     return section(

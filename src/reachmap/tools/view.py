@@ -84,7 +84,8 @@ def view(
         from reachmap.view.page import page_of
 
         text = page_of(record, cell, paths)
-        return publish(page, [text.encode()], overwrite=overwrite)
+        publish(page, [text.encode()], overwrite=overwrite)
+        return page
     from reachmap.view.app import App
 
     options = options or ViewOptions()

@@ -56,9 +56,8 @@ def start_server(port: int) -> viser.ViserServer:
     server.scene.set_up_direction("+z")
     server.scene.world_axes.visible = False
     _light(server)
-    server.gui.configure_theme(
-        control_layout="collapsible", show_logo=False, show_share_button=False
-    )
+    server.gui.configure_theme(show_logo=False, show_share_button=False)
+    server.gui.main_panel.dock_right()
     return server
 
 

@@ -104,15 +104,16 @@ def _eased(
 ) -> tuple[FloatArray, FloatArray]:
     """Points of a way from rest to rest in a time, (k, dof), and their times (k,).
 
-    Speed is a trapezoid: as short a ramp as the acceleration takes on average.
+    Speed is the trapezoid that :func:`reachmap.core.timing.segment_times_s` times: with
+    the bounds V and A of the share of the way, each ramp takes V/A.
     """
     count = max(2, round(time_s * FRAMES_PER_S) + 1)
     steps = np.linspace(0.0, 1.0, count)
     change = np.abs(way[-1] - way[0])
+    with np.errstate(divide="ignore"):
+        ramp_s = (velocity / change).min() / (acceleration / change).min()
     # Share of the time spent on each ramp; one half is a triangle.
-    with np.errstate(divide="ignore", invalid="ignore"):
-        ramp_s = float(np.nanmin(np.where(change > 0, velocity / acceleration, np.nan)))
-    ramp = float(np.clip(ramp_s / max(time_s, 1e-9), 0.05, 0.5))
+    ramp = float(np.clip(ramp_s / max(time_s, 1e-9), 0.01, 0.5))
     top = 1.0 / (1.0 - ramp)
     share = np.where(
         steps < ramp,

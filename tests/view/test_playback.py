@@ -1,0 +1,103 @@
+"""Stored paths in time, on real paths of the planar toy arm."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from toy_artefacts import toy_bin_map
+
+from reachmap.core.solids import SolidCell
+from reachmap.errors import SettingsError
+from reachmap.tools.options import cell_of_artefact
+from reachmap.view.playback import (
+    Playback,
+    choose_paths,
+    find_path,
+    playback_of,
+    way_points,
+)
+
+
+@pytest.fixture(scope="module")
+def cell() -> SolidCell:
+    """The toy arm, as the artefact keeps it."""
+    return SolidCell.build(cell_of_artefact(toy_bin_map().provenance, "toy"))
+
+
+@pytest.fixture(scope="module")
+def playbacks(cell: SolidCell) -> list[Playback]:
+    """All stored paths."""
+    record = toy_bin_map()
+    return [
+        playback_of(record, row, cell.robot)
+        for row in range(len(record.paths.row_size))
+    ]
+
+
+def test_a_playback_takes_the_execution_time(playbacks: list[Playback]) -> None:
+    """To the grasp and back out, exactly as long as the map says."""
+    record = toy_bin_map()
+    assert playbacks
+    for row, playback in enumerate(playbacks):
+        place = tuple(record.paths.index[row])
+        assert playback.time_s[-1] == pytest.approx(record.execution_time[place])
+        assert (np.diff(playback.time_s) > 0).all()
+        assert len(playback.time_s) == len(playback.configuration)
+
+
+def test_a_playback_goes_from_the_scan_to_the_grasp_and_out(
+    playbacks: list[Playback], cell: SolidCell
+) -> None:
+    """It begins where paths begin, is at the test grasp once, and ends before it."""
+    record = toy_bin_map()
+    for row, playback in enumerate(playbacks):
+        planned, approach = way_points(record, row)
+        q = playback.configuration
+        assert q[0] == pytest.approx(record.scan_configuration)
+        assert q[playback.grasp] == pytest.approx(approach[-1])
+        assert q[-1] == pytest.approx(planned[-1])
+        T = cell.tcp_pose(q[playback.grasp])
+        expected = record.position[playback.test_grasp[:3]]
+        assert T[:3, 3] == pytest.approx(expected, abs=1e-6)
+
+
+def test_a_playback_stays_on_the_path(playbacks: list[Playback]) -> None:
+    """Every way-point of the planned part is passed, none is cut off."""
+    record = toy_bin_map()
+    for row, playback in enumerate(playbacks):
+        planned, _ = way_points(record, row)
+        for point in planned:
+            nearest = np.linalg.norm(playback.configuration - point, axis=1).min()
+            assert nearest < 0.12
+
+
+def test_no_joint_is_faster_than_it_can(
+    playbacks: list[Playback], cell: SolidCell
+) -> None:
+    """Finite differences stay below the limits that the time was computed with."""
+    for playback in playbacks:
+        step = np.diff(playback.configuration, axis=0)
+        speed = np.abs(step) / np.diff(playback.time_s)[:, None]
+        assert (speed <= cell.robot.velocity_rad_s * 1.001).all()
+
+
+def test_the_paths_to_watch_are_in_different_quadrants() -> None:
+    """One for each quadrant that has any."""
+    record = toy_bin_map()
+    rows = choose_paths(record)
+    places = record.paths.index[list(rows)]
+    quadrants = {(record.y[y] >= 0, record.x[x] >= 0) for _, y, x, _, _ in places}
+    assert len(quadrants) == len(rows) >= 2
+
+
+def test_a_path_is_found_by_its_test_grasp() -> None:
+    """The one with the least length; others are refused with the range."""
+    record = toy_bin_map()
+    layer, y, x, orientation, _ = (int(i) for i in record.paths.index[0])
+    row = find_path(record, (layer, y, x, orientation))
+    assert record.paths.index[row].tolist()[:4] == [layer, y, x, orientation]
+    with pytest.raises(SettingsError, match="no such test grasp"):
+        find_path(record, (0, 99, 0, 0))
+    without = np.argwhere(record.path_found.sum(axis=-1) == 0)
+    with pytest.raises(SettingsError, match="no path to this test grasp"):
+        find_path(record, tuple(int(i) for i in without[0]))
