@@ -44,7 +44,7 @@ def command(
     Example: reachmap bin-scan placement.h5 --set bin_scan.repeats=1
     """
     from reachmap.tools.bin_scan import bin_scan, estimate_bin_scan, summary_of_bin
-    from reachmap.tools.options import RunOptions
+    from reachmap.tools.options import RunOptions, written_by
 
     if placement is None and cell is None:
         placement = Path("placement.h5")
@@ -62,5 +62,5 @@ def command(
         result = bin_scan(
             placement, output, cell=cell, overrides=overrides, seed=seed, run=run
         )
-        facts = {"output": str(output)} | summary_of_bin(result)
+        facts = {"output": str(written_by(output, run))} | summary_of_bin(result)
     click.echo(json.dumps(facts) if as_json else facts_text(facts))

@@ -52,7 +52,7 @@ def command(
 
     Example: reachmap workspace-scan ur5-eye-in-hand --seed 7
     """
-    from reachmap.tools.options import RunOptions
+    from reachmap.tools.options import RunOptions, written_by
     from reachmap.tools.workspace_scan import (
         estimate_workspace_scan,
         summary_of_workspace,
@@ -81,5 +81,5 @@ def command(
             seed=seed,
             run=run,
         )
-        facts = {"output": str(output)} | summary_of_workspace(result)
+        facts = {"output": str(written_by(output, run))} | summary_of_workspace(result)
     click.echo(json.dumps(facts) if as_json else facts_text(facts))

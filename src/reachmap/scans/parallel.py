@@ -14,6 +14,7 @@ from reachmap.scans.encoding import json_from_value, value_from_json
 from reachmap.scans.executors import open_lanes
 from reachmap.scans.progress import Progress
 from reachmap.scans.results import last_line
+from reachmap.scans.signals import stop_signals
 from reachmap.scans.tasks import Job, Parcel, package_versions
 from reachmap.scans.work import one_frame
 
@@ -57,11 +58,14 @@ def compute_units(
     payloads: list[Any] = [None] * units
     progress.begin(units)
     with (
+        stop_signals() as stop,
         open_lanes(executor, min(workers, units), parcel) as lanes,
         Crew(lanes) as crew,
         closing(crew.replies(range(units))) as replies,
     ):
+        stop.at_once = executor == "processes" and workers == 1
         for reply in replies:
+            stop.check()
             if reply is None:
                 progress.tick()
                 continue

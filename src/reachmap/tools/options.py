@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from reachmap.cell.loading import cell_from_json
 from reachmap.maps import Provenance
+from reachmap.scans.journal import journal_path
 
 if TYPE_CHECKING:
     from reachmap.cell.loading import LoadedCell
@@ -28,6 +30,11 @@ class RunOptions:
 def with_seed(overrides: Sequence[str], seed: int | None) -> tuple[str, ...]:
     """Append to overrides the seed of ``--seed``, if one was given."""
     return (*overrides, *(() if seed is None else (f"seed={seed}",)))
+
+
+def written_by(output: Path, run: RunOptions) -> Path:
+    """Name the file that a scan leaves: the artefact, or the journal of a shard."""
+    return output if run.shard is None else journal_path(output, run.shard)
 
 
 def cell_of_artefact(
