@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
+from reachmap.cell.loading import read_cell
+from reachmap.core.solids import SolidCell
 from reachmap.core.tessellation import box_triangles, capsule_triangles
+from reachmap.plots.cell_view import draw_cell
 from reachmap.plots.raster import (
     Facets,
     Window,
@@ -15,6 +19,7 @@ from reachmap.plots.raster import (
     view_axes,
     visible_area,
 )
+from reachmap.plots.style import figure_bytes
 
 RED, BLUE = np.array([0.9, 0.1, 0.1]), np.array([0.1, 0.1, 0.9])
 TOP = Window(axes=view_axes(-90.0, 90.0), low=np.full(2, -1.0), high=np.full(2, 1.0))
@@ -76,3 +81,21 @@ def test_nothing_is_drawn_where_nothing_is() -> None:
     assert image[0, 0, 3] == 0.0
     assert image[40, 40, 3] == 1.0
     assert (image == render(facets, TOP, 40.0)).all()
+
+
+def test_a_cell_is_drawn_in_three_views(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Axes are in metres, bodies in contact are red, equal cells give equal bytes."""
+    monkeypatch.setattr("reachmap.plots.style.DPI", 40)
+    monkeypatch.setattr("reachmap.plots.cell_view.PIXELS_PER_IN", 20.0)
+    cell = SolidCell.build(read_cell("planar-toy"))
+    figure = draw_cell(cell, title="toy")
+    labels = [axes.get_ylabel() for axes in figure.axes]
+    assert labels == ["", "z [m]", "y [m]"]
+
+    def data(drawn: Figure) -> bytes:
+        return figure_bytes(drawn, "png", title="", config_sha256="")
+
+    assert data(figure) == data(draw_cell(cell, title="toy"))
+    red = draw_cell(cell, title="toy", blocking=("post",))
+    assert "in contact" in {t.get_text() for t in red.legends[0].get_texts()}
+    assert data(red) != data(figure)

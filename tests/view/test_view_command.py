@@ -25,6 +25,7 @@ from reachmap.errors import MissingExtraError
 from reachmap.maps import write_bin_map, write_workspace_map
 from reachmap.tools.options import cell_of_artefact
 from reachmap.tools.view import ViewOptions, view
+from reachmap.view.question import best_first
 
 pytest.importorskip("viser")
 
@@ -53,7 +54,9 @@ def test_a_page_needs_nothing_else(folder: Path, name: str) -> None:
     assert "__VISER_EMBED_DATA__" in page
     assert set(re.findall(r"https?://[^\s\"'`)<>\\/]+", page)) <= {"http://www.w3.org"}
     assert "default-src 'none'" in page
-    assert not re.search(r"<(script|link|img|iframe)[^>]+(src|href)=\"?(?!data:)", page)
+    assert not re.search(
+        r"<(script|link|img|iframe)[^>]+(src|href)=[\"'](?!data:)", page
+    )
     assert "planar-toy" in page
 
 
@@ -150,14 +153,11 @@ def app(request: pytest.FixtureRequest) -> Iterator[Any]:
 def test_a_click_moves_the_arm_and_reddens_bodies(app: Any) -> None:
     """A colliding frame turns its two bodies red; home makes them as they were."""
     frames = app.points.frames
-    colliding = np.flatnonzero(frames.pair >= 0)
-    point = next(
-        int(p)
-        for p in np.unique(frames.point[colliding])
-        if (frames.status[frames.point == p] != 1).all()
-    )
+    row = int(np.flatnonzero(frames.pair >= 0)[0])
+    point = int(frames.point[row])
     before = app.stage._last.copy()
     app.show_point(point)
+    app.show_frame(best_first(app.points, point).index(row))
     assert app.answer.blocking
     assert app.stage._red == set(app.answer.blocking)
     assert not np.allclose(app.stage._last, before)

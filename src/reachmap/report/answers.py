@@ -9,6 +9,7 @@ from reachmap.maps.statistics import best_level, level_means, saturation_of
 from reachmap.report.folder import RunFolder
 from reachmap.report.markup import Html, element, joined, paragraph
 from reachmap.report.numbers import count, interval, number, percent, signed
+from reachmap.report.ranked_rows import ranked_rows
 
 FIRST_PICKS = 3
 
@@ -105,21 +106,16 @@ def _picks(run: RunFolder) -> Html:
     question = "Which grasps come first?"
     if not run.ranked:
         return _absent(question, "There is no ranked grasp list in this folder.")
-    grasps = run.ranked[0]["grasps"]
-    said = [(grasp, grasp.get("reachmap") or {}) for grasp in grasps]
-    reachable = [(g, r) for g, r in said if r.get("cost") is not None]
-    if not reachable:
+    rows = ranked_rows(run.ranked[0])
+    reached = [row for row in rows if row.cost is not None]
+    if not reached:
         return _tile(
-            question, "none", f"None of {count(len(grasps), 'grasp')} is reached."
+            question, "none", f"None of {count(len(rows), 'grasp')} is reached."
         )
-    names = [
-        str(grasp.get("id", f"no. {result.get('original_rank', '?')}"))
-        for grasp, result in reachable[:FIRST_PICKS]
-    ]
-    costs = [float(result["cost"]) for _, result in reachable[:FIRST_PICKS]]
+    first = reached[:FIRST_PICKS]
     return _tile(
         question,
-        ", ".join(names),
-        f"With cost J = {', '.join(number(cost, 2) for cost in costs)}. "
-        f"{len(reachable)} of {count(len(grasps), 'supplied grasp')} are reached.",
+        ", ".join(row.name for row in first),
+        f"With cost J = {', '.join(number(row.cost, 2) for row in first)}. "
+        f"{len(reached)} of {count(len(rows), 'supplied grasp')} are reached.",
     )

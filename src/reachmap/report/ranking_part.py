@@ -14,7 +14,8 @@ from reachmap.ranking.cost_groups import QUADRANT_ORDER
 from reachmap.ranking.ranked_list import TERM_NAMES
 from reachmap.report.drawing import drawn
 from reachmap.report.markup import Html, element, joined, paragraph, section, table
-from reachmap.report.numbers import count, number
+from reachmap.report.numbers import NONE, count, number
+from reachmap.report.ranked_rows import RankedRow, ranked_rows, weights_of
 
 TOP = 10
 
@@ -49,54 +50,44 @@ def ranking_section(documents: Sequence[Mapping[str, Any]], record: Artefact) ->
     return section("ranking", "Which grasps come first", joined(parts))
 
 
-def _results(document: Mapping[str, Any]) -> list[tuple[Mapping[str, Any], Any]]:
-    return [
-        (grasp, grasp["reachmap"])
-        for grasp in document["grasps"]
-        if isinstance(grasp, dict) and isinstance(grasp.get("reachmap"), dict)
-    ]
-
-
 def _words(document: Mapping[str, Any]) -> str:
-    results = _results(document)
-    reached = sum(result.get("cost") is not None for _, result in results)
-    weights = document["reachmap"].get("weights") or ()
-    said = ", ".join(number(w, 2) for w in weights if isinstance(w, float | int))
+    rows = ranked_rows(document)
+    reached = sum(row.cost is not None for row in rows)
+    weights = ", ".join(number(weight, 2) for weight in weights_of(document))
     return (
-        f"{count(len(results), 'grasp')}, {reached} of them reached. "
-        f"J is the weighted sum of path length, planning time and execution time "
-        f"of the nearest test grasp, each as a share of its maximum (weights {said})."
+        f"{count(len(rows), 'grasp')}, {reached} of them reached. "
+        "J is the weighted sum of path length, planning time and execution time "
+        "of the nearest test grasp, each as a share of its maximum "
+        f"(weights {weights or NONE})."
     )
 
 
 def _table(document: Mapping[str, Any]) -> Html:
-    rows = []
-    for grasp, result in _results(document)[:TOP]:
-        terms = result.get("terms") or {}
-        rows.append(
-            (
-                result.get("rank", ""),
-                result.get("original_rank", ""),
-                str(grasp.get("id", "")),
-                str(grasp.get("quadrant") or ""),
-                number(result.get("cost"), 3),
-                *(number(terms.get(name), 3) for name in TERM_NAMES[:3]),
-                str(result.get("status", "")).replace("_", " "),
-            )
+    rows = [
+        (
+            NONE if row.rank is None else row.rank,
+            NONE if row.original_rank is None else row.original_rank,
+            row.name,
+            row.quadrant,
+            number(row.cost, 3),
+            *(number(row.terms.get(name), 3) for name in TERM_NAMES[:3]),
+            row.status,
         )
+        for row in ranked_rows(document)[:TOP]
+    ]
     head = ("rank", "was", "grasp", "quadrant", "J", *TERM_LABELS[:3], "state")
     return table(head, rows, ">><<>>>><")
 
 
 def _groups(document: Mapping[str, Any], name: str) -> list[CostGroup]:
     """Costs by quadrant, or of the whole list if it names none."""
-    results = _results(document)
-    several = any(grasp.get("quadrant") for grasp, _ in results)
+    rows = ranked_rows(document)
+    several = any(row.quadrant for row in rows)
     rest = "other" if several else "" if name else "all"
     groups = []
     for quadrant in QUADRANT_ORDER:
-        own = [r for g, r in results if (g.get("quadrant") or None) == quadrant]
-        supplied = sorted(own, key=lambda result: int(result.get("original_rank", 0)))
+        own = [row for row in rows if row.quadrant == (quadrant or "")]
+        supplied = sorted(own, key=lambda row: row.original_rank or 0)
         if own:
             label = f"{name} {quadrant or rest}".strip()
             groups.append(
@@ -105,13 +96,8 @@ def _groups(document: Mapping[str, Any], name: str) -> list[CostGroup]:
     return groups
 
 
-def _terms(results: Sequence[Mapping[str, Any]]) -> FloatArray:
+def _terms(rows: Sequence[RankedRow]) -> FloatArray:
     """Terms of J, shape (n, 3) or (n, 4) with likeness; NaN where unreachable."""
-    found = {name for result in results for name in result.get("terms") or {}}
-    names = TERM_NAMES if TERM_NAMES[3] in found else TERM_NAMES[:3]
-    return np.array(
-        [
-            [float((result.get("terms") or {}).get(name, np.nan)) for name in names]
-            for result in results
-        ]
-    )
+    with_likeness = any(TERM_NAMES[3] in row.terms for row in rows)
+    names = TERM_NAMES if with_likeness else TERM_NAMES[:3]
+    return np.array([[row.terms.get(name, np.nan) for name in names] for row in rows])

@@ -7,6 +7,7 @@ from typing import Any
 
 from reachmap.report.markup import Html, element, paragraph, section, table
 from reachmap.report.numbers import NONE, number, percent, signed
+from reachmap.report.ranked_rows import known_number
 
 SHARES = {
     "precision": "called reachable, and reached",
@@ -23,8 +24,7 @@ def validation_section(facts: Mapping[str, Any]) -> Html:
     facts : mapping
         As :mod:`reachmap.validation.facts` writes it; what is absent is left out.
     """
-    lists = [one for one in facts.get("lists", ()) if isinstance(one, dict)]
-    groups = [one for one in facts.get("groups", ()) if isinstance(one, dict)]
+    lists, groups = (_mappings(facts.get(name)) for name in ("lists", "groups"))
     words = {"repeats": "attempts at each", "rolls": "rolls where the roll is free"}
     said = ", ".join(
         f"{name}: {facts[key]}" for key, name in words.items() if key in facts
@@ -54,13 +54,13 @@ def _list_table(lists: list[dict[str, Any]]) -> Html:
     rows = []
     for one in lists:
         confusion = _mapping(one, "confusion")
-        rank = _mapping(one, "correlation").get("spearman")
+        rank = known_number(_mapping(one, "correlation").get("spearman"))
         rows.append(
             (
                 str(one.get("list", "")),
                 one.get("grasps", NONE),
                 *(_share_words(_mapping(confusion, name)) for name in SHARES),
-                NONE if rank is None else signed(float(rank), 2),
+                NONE if rank is None else signed(rank, 2),
             )
         )
     head = ("list", "grasps", *SHARES.values(), "order of J (Spearman)")
@@ -68,10 +68,11 @@ def _list_table(lists: list[dict[str, Any]]) -> Html:
 
 
 def _share_words(share: Mapping[str, Any]) -> str:
-    if not share.get("total"):
+    known = [known_number(share.get(name)) for name in ("share", "low", "high")]
+    said = [None if value is None else 100.0 * value for value in known]
+    if said[0] is None:
         return NONE
-    low, high = (number(100.0 * float(share.get(k) or 0.0), 1) for k in ("low", "high"))
-    return f"{percent(100.0 * float(share['share']))} ({low} to {high})"
+    return f"{percent(said[0])} ({number(said[1], 1)} to {number(said[2], 1)})"
 
 
 def _group_table(groups: list[dict[str, Any]]) -> Html:
@@ -88,11 +89,11 @@ def _group_table(groups: list[dict[str, Any]]) -> Html:
                     " of ".join(
                         str(figures.get(key, NONE)) for key in ("reached", "considered")
                     ),
-                    number(figures.get("cost"), 3),
-                    number(figures.get("path_length"), 2),
+                    number(known_number(figures.get("cost")), 3),
+                    number(known_number(figures.get("path_length")), 2),
                     number(_milli(figures.get("planning_time")), 1),
-                    number(figures.get("execution_time"), 2),
-                    number(figures.get("calls_first"), 2),
+                    number(known_number(figures.get("execution_time")), 2),
+                    number(known_number(figures.get("calls_first")), 2),
                 )
             )
             label = ""
@@ -102,9 +103,15 @@ def _group_table(groups: list[dict[str, Any]]) -> Html:
 
 
 def _milli(value: Any) -> float | None:
-    return None if value is None else 1e3 * float(value)
+    known = known_number(value)
+    return None if known is None else 1e3 * known
 
 
 def _mapping(parent: Mapping[str, Any], key: str) -> Mapping[str, Any]:
     value = parent.get(key)
     return value if isinstance(value, dict) else {}
+
+
+def _mappings(value: Any) -> list[dict[str, Any]]:
+    items = value if isinstance(value, list) else []
+    return [item for item in items if isinstance(item, dict)]
