@@ -14,7 +14,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from reachmap._typing import BoolArray, FloatArray
+from reachmap._typing import FloatArray
 from reachmap.core.bodies import BodyGeometry
 from reachmap.core.robot import RobotModel
 
@@ -61,7 +61,7 @@ class PlacedBodies:
 
     def near(self, low: FloatArray, high: FloatArray) -> list[int]:
         """Bodies whose boxes meet the box between two corners (3,)."""
-        hit: BoolArray = ((self._low <= high) & (self._high >= low)).all(axis=1)
+        hit = ((self._low <= high) & (self._high >= low)).all(axis=1)
         return [int(k) for k in np.flatnonzero(hit)]
 
     def touching(self, shape: Any, T: FloatArray, among: Sequence[int]) -> int:

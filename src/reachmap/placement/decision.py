@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -10,13 +12,13 @@ import numpy as np
 from reachmap.core.bin_fit import BinFit, ToolFit
 from reachmap.core.scene import Scene
 from reachmap.errors import SceneError
-from reachmap.geometry import yaw_transform
+from reachmap.geometry import transform_from_parts, yaw_transform
 from reachmap.maps.records import WorkspaceMap
 from reachmap.placement.candidates import Candidate, CandidateTable
 from reachmap.placement.evaluator import Evaluator
-from reachmap.placement.exact import Pose
+from reachmap.placement.exact import ALWAYS, Pose
 from reachmap.placement.field import field_of
-from reachmap.placement.footprint import Footprint, footprint_of
+from reachmap.placement.footprint import footprint_of
 from reachmap.placement.paper_rule import LatticePoint, choose_by_paper
 from reachmap.placement.places import (
     apart_m,
@@ -26,14 +28,14 @@ from reachmap.placement.places import (
     spread_out,
 )
 from reachmap.placement.prediction import predict
-from reachmap.placement.refine import refine
+from reachmap.placement.refine import MIN_GAIN_POINTS, refine
 from reachmap.placement.region import Region
 
 if TYPE_CHECKING:
     from reachmap.cell.loading import LoadedCell
 
 TURNS_DEG = (45.0, 90.0, 135.0)
-PLACES_TURNED = 2
+PLACES_IMPROVED = 2
 NO_ROW = -1
 
 
@@ -76,7 +78,7 @@ class Question:
         """Whether the bin would stand free at a pose, in the region or not."""
         return self.fit.contact(yaw_transform(*pose)) is None
 
-    def exact(self, poses: list[Pose], *, above: float = -1.0) -> list[Candidate]:
+    def exact(self, poses: Sequence[Pose], *, above: float = ALWAYS) -> list[Candidate]:
         """Map poses from the cell's own scan configuration.
 
         Poses whose bound is not above a score are left out; what is blocked comes
@@ -138,21 +140,12 @@ def decide_by_search(question: Question, top: int) -> Decision:
     for place in places:
         decision.table.add(place)
     finalists = spread_out(places, top, question.different_place_m)
-    if not finalists:
-        raise SceneError(_nowhere(question, decision.table))
     paper = paper_pose(question)
     poses = [c.pose for c in finalists] + ([] if paper is None else [paper])
     mapped = question.exact(poses)
-    mapped += _turned(question, mapped)
-    best = min((c for c in mapped if c.score is not None), key=rank_key, default=None)
-    if best is not None:
-        mapped += refine(
-            best,
-            question.scene.scan_configuration,
-            question.region,
-            question.reason_against,
-            question.evaluator,
-        )
+    scored = sorted((c for c in mapped if c.score is not None), key=rank_key)
+    better = _improved(question, scored[:PLACES_IMPROVED])
+    mapped += question.exact([pose for pose in better if pose not in poses])
     for candidate in {c.pose: c for c in mapped}.values():
         row = decision.table.add(candidate)
         if candidate.pose == paper:
@@ -238,27 +231,41 @@ def _predicted(question: Question) -> list[Candidate]:
     workspace, loaded = question.workspace, question.loaded
     grid = pose_grid(question.region, workspace.x, workspace.y, workspace.z)
     footprint = footprint_of(loaded.cell)
-    blocked = ToolFit(question.scene.robot, loaded).blocked(footprint.transforms())
-    footprint = Footprint(
-        points=footprint.points,
-        R=footprint.R,
-        open=~blocked.reshape(footprint.open.shape),
+    blocked = ToolFit(question.scene.robot, loaded).blocked(
+        transform_from_parts(footprint.R, footprint.points[:, None]).reshape(-1, 4, 4)
+    )
+    footprint = dataclasses.replace(
+        footprint, open=~blocked.reshape(footprint.open.shape)
     )
     prediction = predict(field_of(workspace), footprint, grid)
     return list(best_at_each_place(prediction, question.reason_against))
 
 
-def _turned(question: Question, mapped: list[Candidate]) -> list[Candidate]:
-    """The best places with the bin turned, as far as that may be better."""
-    scored = sorted((c for c in mapped if c.score is not None), key=rank_key)
-    poses = [
-        pose
-        for c in scored[:PLACES_TURNED]
-        for turn in TURNS_DEG
-        if not question.reason_against(pose := _with_turn(c.pose, turn, question))
-    ]
-    least = scored[0].score.score if scored and scored[0].score else 0.0
-    return question.exact(poses, above=least)
+def _improved(question: Question, starts: list[Candidate]) -> list[Pose]:
+    """Better poses near some places: turned first, then the best of all moved.
+
+    A pose counts as better by a quarter of a point.
+    """
+    best: list[Candidate] = []
+    for start in starts:
+        assert start.score is not None
+        turned = [_with_turn(start.pose, turn, question) for turn in TURNS_DEG]
+        found = question.exact(
+            [pose for pose in turned if not question.reason_against(pose)],
+            above=start.score.score + MIN_GAIN_POINTS,
+        )
+        scored = [c for c in found if c.score is not None]
+        best.append(min([start, *scored], key=rank_key))
+    if not best:
+        return []
+    moved = refine(
+        min(best, key=rank_key),
+        question.scene.scan_configuration,
+        question.region,
+        question.reason_against,
+        question.evaluator,
+    )
+    return list(dict.fromkeys([moved.pose, *(c.pose for c in best)]))
 
 
 def _with_turn(pose: Pose, turn_deg: float, question: Question) -> Pose:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import secrets
 from collections import OrderedDict
@@ -14,7 +15,8 @@ import numpy as np
 
 from reachmap._typing import FloatArray
 from reachmap.errors import EngineError
-from reachmap.placement.exact import PlacedScene, Pose, PoseScore
+from reachmap.placement.exact import ALWAYS, NEVER, PlacedScene, Pose, PoseScore
+from reachmap.placement.footprint import COARSE, Grid
 from reachmap.scans.crew import Crew
 from reachmap.scans.encoding import json_from_value, value_from_json
 from reachmap.scans.executors import open_lanes
@@ -27,7 +29,6 @@ if TYPE_CHECKING:
     from reachmap.cell.loading import LoadedCell
 
 SCENES_KEPT = 2
-ALWAYS = -1.0
 USUAL_POSES = 90
 
 
@@ -79,6 +80,8 @@ class Evaluator:
         q: FloatArray,
         *,
         above: float = ALWAYS,
+        enough: float = NEVER,
+        grid: Grid = COARSE,
     ) -> list[Evaluation]:
         """Score poses, each from a scan configuration.
 
@@ -89,10 +92,15 @@ class Evaluator:
             Scan configuration of all, or of each [rad].
         above : float
             A pose whose bound is not above this need not be scored [percent].
+        enough : float
+            A score from which on no more is looked for [percent].
+        grid : (int, int)
+            See :func:`reachmap.placement.footprint.sample_of`.
         """
         starts = np.broadcast_to(q, (len(poses), np.shape(q)[-1]))
         keys = [
-            (*pose, *start.tolist()) for pose, start in zip(poses, starts, strict=True)
+            (*grid, enough, *pose, *start.tolist())
+            for pose, start in zip(poses, starts, strict=True)
         ]
         missing = [key for key in dict.fromkeys(keys) if self._is_open(key, above)]
         units = {unit_of_numbers([*key, above]): key for key in missing}
@@ -143,32 +151,33 @@ class Prepared:
 
     def __init__(self, loaded: LoadedCell) -> None:
         self.loaded = loaded
-        self._scenes: OrderedDict[Pose, PlacedScene] = OrderedDict()
+        self._scenes: OrderedDict[tuple[Grid, Pose], PlacedScene] = OrderedDict()
 
-    def scene_at(self, pose: Pose) -> PlacedScene:
-        """Scene with the bin at a pose, surveyed."""
-        if pose not in self._scenes:
-            self._scenes[pose] = PlacedScene.build(self.loaded, pose)
-        self._scenes.move_to_end(pose)
+    def scene_at(self, pose: Pose, grid: Grid) -> PlacedScene:
+        """Scene with the bin at a pose."""
+        key = (grid, pose)
+        if key not in self._scenes:
+            self._scenes[key] = PlacedScene(self.loaded, pose, grid)
+        self._scenes.move_to_end(key)
         while len(self._scenes) > SCENES_KEPT:
             self._scenes.popitem(last=False)
-        return self._scenes[pose]
+        return self._scenes[key]
 
 
 def evaluate_unit(prepared: Prepared, unit: int) -> dict[str, Any]:
     """Score one pose; the unit's number says which, see :func:`unit_of_numbers`."""
-    x, y, z, yaw, *rest = numbers_of_unit(unit)
+    across, along, enough, x, y, z, yaw, *rest = numbers_of_unit(unit)
     q, above = np.array(rest[:-1]), rest[-1]
-    placed = prepared.scene_at((x, y, z, yaw))
-    pair = placed.scene.checker.blocking_pair(q)
-    blocked = placed.scene.checker.body_pairs[pair] if pair >= 0 else ""
-    if blocked or placed.bound <= above:
-        return {"bound": placed.bound, "blocked": blocked, "score": None}
-    score = placed.score_from(q)
+    placed = prepared.scene_at((x, y, z, yaw), (int(across), int(along)))
+    checker = placed.scene.checker
+    pair = checker.blocking_pair(q)
+    if pair >= 0:
+        return {"bound": 0.0, "blocked": checker.body_pairs[pair], "score": None}
+    bound, score = placed.score_from(q, above=above, enough=enough)
     return {
-        "bound": placed.bound,
+        "bound": bound,
         "blocked": "",
-        "score": {name: getattr(score, name) for name in score.__slots__},
+        "score": None if score is None else dataclasses.asdict(score),
     }
 
 

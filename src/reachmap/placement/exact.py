@@ -1,26 +1,32 @@
-"""The exact score of a bin pose: roadmap to a coarse grid, bin in the scene."""
+"""The exact score of a bin pose: roadmap to a coarse grid, bin in the scene.
+
+What a score costs is mostly straight approaches, so they are looked at lazily: one
+branch of each frame's inverse kinematics first, the others only if the frame is not
+reached.
+"""
 
 from __future__ import annotations
 
-import dataclasses
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from reachmap._typing import FloatArray
+from reachmap._typing import FloatArray, IntArray
+from reachmap.core.approach import StraightApproach
+from reachmap.core.connection import ROADMAP_PLANNER, Connection, connect
+from reachmap.core.planning import Planner
 from reachmap.core.scene import Scene
 from reachmap.geometry import yaw_transform
-from reachmap.maps.records import Status
-from reachmap.placement.footprint import coarse_spec
-from reachmap.sampling.frames import bin_test_frames
-from reachmap.scans.survey import Survey, survey_frames
-from reachmap.scans.workspace_roadmap import connect_survey, results_of_connection
+from reachmap.placement.footprint import COARSE, Grid, sample_of
 
 if TYPE_CHECKING:
     from reachmap.cell.loading import LoadedCell
 
-ATTEMPTS = 2
+ATTEMPTS = 1
+ALWAYS = -1.0
+NEVER = 1000.0
+ROUNDING = 1e-9
 Pose = tuple[float, float, float, float]
 
 
@@ -47,54 +53,194 @@ class PoseScore:
     path_length_rad: float
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PlacedScene:
-    """A cell with its bin at one pose, and the goals of the coarse test frames.
+    """A cell with its bin at one pose, and what its test frames offer.
+
+    Parameters
+    ----------
+    loaded : LoadedCell
+    pose : (x, y, z [m], yaw [rad])
+    grid : (int, int)
+        See :func:`reachmap.placement.footprint.sample_of`.
 
     Attributes
     ----------
     scene : Scene
-    survey : Survey
-    orientations : int
-        Test frames at each point.
+    T : array, shape (frames, 4, 4)
+        T_base_tcp.
+    Q : array, shape (branches, dof)
+        Free configurations of all frames, those nearest to the cell's own scan
+        configuration first in each frame [rad].
+    frame : int array, shape (branches,)
+        Frame of each, rising.
     """
 
-    scene: Scene
-    survey: Survey
-    orientations: int
-
-    @classmethod
-    def build(cls, loaded: LoadedCell, pose: Pose) -> PlacedScene:
-        """Put the bin at a pose (x, y, z [m], yaw [rad]) and survey the frames."""
+    def __init__(self, loaded: LoadedCell, pose: Pose, grid: Grid = COARSE) -> None:
         changed = loaded.with_changes(bin_pose=yaw_transform(*pose))
-        scene = Scene.build(changed, with_bin=True)
+        self.scene = Scene.build(changed, with_bin=True)
         cell = changed.cell
-        spec = coarse_spec(cell.bin_scan, cell.bin.inner)
-        axis = cell.robot.tcp.approach_axis
-        grid = bin_test_frames(spec, cell.bin, axis, scene.T_base_bin).frames
-        scene.checker.reset()
-        survey = survey_frames(
-            scene, grid.transforms_at(slice(None)), spec.approach_distance_m
+        sample = sample_of(cell, grid, self.scene.T_base_bin)
+        self.T = sample.frames.transforms_at(slice(None))
+        self._point_weights = sample.weights
+        self._weights = np.repeat(
+            sample.weights / sample.frames.shape[-1], sample.frames.shape[-1]
         )
-        return cls(scene=scene, survey=survey, orientations=grid.shape[-1])
+        self._approach = StraightApproach(
+            self.scene.kinematics,
+            self.scene.motions,
+            cell.robot.tcp.approach_axis,
+            cell.bin_scan.approach_distance_m,
+        )
+        self._survey()
+        self._first: _Goals | None = None
+
+    def _survey(self) -> None:
+        scene = self.scene
+        scene.checker.reset()
+        Q, frame = scene.kinematics.solve_many(self.T, windings=False)
+        self._has_ik = np.bincount(frame, minlength=len(self.T)) > 0
+        free = scene.checker.free_mask(Q)
+        Q, frame = Q[free], frame[free]
+        away = np.round(np.linalg.norm(Q - scene.scan_configuration, axis=1), 9)
+        order = np.lexsort((away, frame))
+        self.Q, self.frame = Q[order], frame[order]
+        self._begin = np.searchsorted(self.frame, np.arange(len(self.T) + 1))
 
     @property
     def bound(self) -> float:
-        """Share of frames with a goal [percent]: no score can be higher."""
-        return 100.0 * float((self.survey.status == Status.NOT_ATTEMPTED).mean())
+        """Share of frames with a free configuration [percent]; no score is higher."""
+        return 100.0 * float(self._weights @ (np.diff(self._begin) > 0))
 
-    def score_from(self, q: FloatArray) -> PoseScore:
-        """Score the pose from a scan configuration (dof,), which must be free."""
-        scene = dataclasses.replace(self.scene, scan_configuration=q)
+    def score_from(
+        self, q: FloatArray, *, above: float = ALWAYS, enough: float = NEVER
+    ) -> tuple[float, PoseScore | None]:
+        """Score the pose from a scan configuration.
+
+        Parameters
+        ----------
+        q : array, shape (dof,)
+            Free [rad].
+        above : float
+            The score is not wanted unless it may be above this [percent].
+        enough : float
+            A score from which on no more is looked for [percent].
+
+        Returns
+        -------
+        bound : float
+            No score can be higher.
+        score : PoseScore or None
+            None as soon as the bound is not above ``above``.
+        """
+        if self.bound <= above:
+            return self.bound, None
+        if self._first is None:
+            self._first = self._first_goals(above)
+        first = self._first
+        if first.bound <= above:
+            # Given up half-way: another question may need all of it.
+            self._first = None
+            return first.bound, None
+        connection = self._connect(q, first)
+        score = self._score(connection)
+        if score.score < min(enough, first.bound) - ROUNDING:
+            every = self._with_other_branches(first, connection)
+            if len(every.frame) > len(first.frame):
+                score = self._score(self._connect(q, every))
+        return first.bound, score
+
+    def _first_goals(self, above: float) -> _Goals:
+        """One free approach for each frame that has one, unless too few have."""
+        self.scene.checker.reset()
+        goals = _Goals(tried=self._begin[:-1].copy(), bound=self.bound)
+        for k in np.flatnonzero(np.diff(self._begin)):
+            while goals.tried[k] < self._begin[k + 1]:
+                if self._try_next(goals, int(k)):
+                    break
+            else:
+                goals.bound -= 100.0 * float(self._weights[k])
+                if goals.bound <= above:
+                    break
+        return goals
+
+    def _with_other_branches(self, first: _Goals, connection: Connection) -> _Goals:
+        """Goals of all branches of the frames that were not reached."""
+        self.scene.checker.reset()
+        every = first.copy()
+        missed = np.ones(len(self.T), bool)
+        missed[connection.roadmap.frames_reached()] = False
+        for k in np.flatnonzero(missed):
+            while every.tried[k] < self._begin[k + 1]:
+                self._try_next(every, int(k))
+        return every
+
+    def _try_next(self, goals: _Goals, k: int) -> bool:
+        """Look at the next branch of a frame; True if its approach is free."""
+        row = int(goals.tried[k])
+        goals.tried[k] += 1
+        way = self._approach.of(self.T[k], self.Q[row])
+        if way is None or (len(way) > 1 and not self._approach.is_free(way)):
+            return False
+        goals.q.append(way[0])
+        goals.frame.append(k)
+        return True
+
+    def _connect(self, q: FloatArray, goals: _Goals) -> Connection:
+        scene = self.scene
+        scene.checker.reset()
+        order = np.argsort(goals.frame, kind="stable")
+        Q = np.array(goals.q).reshape(-1, scene.robot.dof)[order]
+        planner = Planner(
+            scene.motions, scene.robot.lower_rad, scene.robot.upper_rad, ROADMAP_PLANNER
+        )
+        frame = np.array(goals.frame, np.int64)[order]
         seed = scene.loaded.cell.seed
-        connection = connect_survey(scene, self.survey, attempts=ATTEMPTS, seed=seed)
-        results = results_of_connection(self.survey, connection)
-        found = results.status == Status.PATH_FOUND
-        points = 100.0 * found.reshape(-1, self.orientations).mean(axis=1)
-        lengths = results.path_length[found]
+        return connect(q, Q, frame, planner, attempts=ATTEMPTS, seed=seed)
+
+    def _score(self, connection: Connection) -> PoseScore:
+        count = len(self.T)
+        length = np.full(count, np.inf)
+        roadmap = connection.roadmap
+        to_goals = roadmap.shortest_paths().length_rad[1 : len(roadmap.frame) + 1]
+        np.minimum.at(length, roadmap.frame, to_goals)
+        found = np.isfinite(length)
+        points = 100.0 * found.reshape(len(self._point_weights), -1).mean(axis=1)
         return PoseScore(
-            score=float(points.mean()),
+            score=float(self._point_weights @ points),
             worst_point=float(points.min()),
-            reachable_share=100.0 * float((results.n_ik > 0).mean()),
-            path_length_rad=float(lengths.mean()) if found.any() else np.inf,
+            reachable_share=100.0 * float(self._weights @ self._has_ik),
+            path_length_rad=(
+                float(np.average(length[found], weights=self._weights[found]))
+                if found.any()
+                else np.inf
+            ),
+        )
+
+
+@dataclass(slots=True, kw_only=True, eq=False)
+class _Goals:
+    """Pre-grasps found so far.
+
+    Attributes
+    ----------
+    q : list of array, shape (dof,)
+    frame : list of int
+        Frame of each.
+    tried : int array, shape (frames,)
+        Next row of the branches for each frame.
+    bound : float
+        Share of frames that have a goal or were not looked at [percent].
+    """
+
+    tried: IntArray
+    bound: float
+    q: list[FloatArray] = field(default_factory=list)
+    frame: list[int] = field(default_factory=list)
+
+    def copy(self) -> _Goals:
+        return _Goals(
+            tried=self.tried.copy(),
+            bound=self.bound,
+            q=list(self.q),
+            frame=list(self.frame),
         )

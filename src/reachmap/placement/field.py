@@ -101,4 +101,4 @@ def linear_weights(grid: FloatArray, at: FloatArray) -> FloatArray:
     weights[rows, low] = 1.0 - share
     if len(grid) > 1:
         weights[rows, low + 1] += share
-    return weights * inside[:, None]
+    return np.asarray(weights * inside[:, None])

@@ -80,9 +80,7 @@ def settle(
             runner_up=decision.runner_up(pose, question.different_place_m),
             paper_choice=_paper_row(decision, row, chosen),
             scan=scan,
-            margin=margins(
-                pose, scan.score.score, scan.q, question.is_possible, question.evaluator
-            ),
+            margin=margins(pose, scan.q, question.is_possible, question.evaluator),
         )
     raise SceneError(
         f"{question.loaded.source}: {UNSEEN} at any of the {min(tries, len(rows))} "

@@ -72,7 +72,6 @@ def predict(field: ReachField, footprint: Footprint, grid: PoseGrid) -> Predicti
     shape = (len(grid.yaw), len(grid.z), len(grid.y), len(grid.x))
     score, worst, ik = (np.zeros(shape) for _ in range(3))
     worst.fill(np.inf)
-    count = len(footprint.points)
     for k, yaw in enumerate(grid.yaw):
         open_shares, all_shares = orientation_shares(field, footprint, float(yaw))
         c, s = np.cos(yaw), np.sin(yaw)
@@ -83,9 +82,10 @@ def predict(field: ReachField, footprint: Footprint, grid: PoseGrid) -> Predicti
                 linear_weights(field.x, grid.x + c * u - s * v),
             )
             percent = 100.0 * _sampled(field.path, open_shares[p], weights)
-            score[k] += percent / count
+            score[k] += footprint.weights[p] * percent
             np.minimum(worst[k], percent, out=worst[k])
-            ik[k] += 100.0 * _sampled(field.ik, all_shares[p], weights) / count
+            share = _sampled(field.ik, all_shares[p], weights)
+            ik[k] += 100.0 * footprint.weights[p] * share
     return Prediction(grid=grid, score=score, worst_point=worst, reachable_share=ik)
 
 

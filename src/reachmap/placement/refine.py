@@ -14,7 +14,8 @@ from reachmap.placement.places import rank_key
 from reachmap.placement.region import AXES, Region
 
 FIRST_STEPS = (0.04, 0.04, 0.04, np.radians(15.0))
-ROUNDS = 4
+ROUNDS = 2
+MIN_GAIN_POINTS = 0.25
 
 
 def refine(
@@ -23,11 +24,12 @@ def refine(
     region: Region,
     reason_against: Callable[[Pose], str],
     evaluator: Evaluator,
-) -> list[Candidate]:
+) -> Candidate:
     """Search around a pose, exactly: the best neighbour is the next start.
 
     Neighbours are one step away along one of x, y, z, yaw; when none is better, the
-    step is halved. Only neighbours whose bound is above the score are mapped.
+    step is halved. A neighbour whose bound is less than a quarter of a point above the
+    score is not worth mapping.
 
     Parameters
     ----------
@@ -42,11 +44,10 @@ def refine(
 
     Returns
     -------
-    list of Candidate
-        All poses that were mapped on the way, the start excluded.
+    Candidate
+        The best that was found, which may be the start.
     """
     best, steps = start, np.array(FIRST_STEPS)
-    mapped: list[Candidate] = []
     for _ in range(ROUNDS):
         poses = [
             pose
@@ -54,18 +55,17 @@ def refine(
             if not reason_against(pose)
         ]
         assert best.score is not None
-        found = evaluator.evaluate(poses, q, above=best.score.score)
+        found = evaluator.evaluate(poses, q, above=best.score.score + MIN_GAIN_POINTS)
         better = [
             Candidate(pose=pose, score=e.score, exact=True)
             for pose, e in zip(poses, found, strict=True)
             if e.score is not None
         ]
-        mapped += better
         champion = min([best, *better], key=rank_key)
         if champion is best:
             steps = steps / 2
         best = champion
-    return mapped
+    return best
 
 
 def _neighbours(pose: Pose, steps: FloatArray, region: Region) -> list[Pose]:

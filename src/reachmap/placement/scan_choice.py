@@ -77,7 +77,7 @@ def choose_scan(
     ScanChoice or None
         None if no configuration images the bin.
     """
-    placed = PlacedScene.build(loaded, pose)
+    placed = PlacedScene(loaded, pose)
     finalists = list(_finalists(placed))
     if not finalists:
         return None
@@ -90,10 +90,8 @@ def choose_scan(
     if not scored:
         return None
     best = max(score.score for score, _ in scored)
-    score, q = min(
-        (pair for pair in scored if pair[0].score >= best - EQUAL_POINTS),
-        key=lambda pair: pair[0].path_length_rad,
-    )
+    near = [pair for pair in scored if pair[0].score >= best - EQUAL_POINTS]
+    score, q = min(near, key=lambda pair: pair[0].path_length_rad)
     return ScanChoice(q=q, score=score, is_new=True)
 
 
@@ -128,12 +126,12 @@ def _finalists(placed: PlacedScene) -> Iterator[FloatArray]:
 
 
 def _order(placed: PlacedScene, Q: FloatArray, missing: IntArray) -> IntArray:
-    """Rows of Q: those that miss least first, then by nearness to the goals.
+    """Rows of Q: those that miss least first, then by nearness to the grasps.
 
     Nearness is the mean over test frames of the straight distance to the nearest
-    goal, which no path can undercut.
+    grasp, which no path can undercut.
     """
-    goals, frame = placed.survey.goals, placed.survey.frame
+    goals, frame = placed.Q, placed.frame
     if not len(goals) or not len(Q):
         return np.argsort(missing, kind="stable")
     begins = np.flatnonzero(np.r_[True, np.diff(frame) > 0])

@@ -21,16 +21,20 @@ from reachmap.placement import (
 def placement_settings() -> dict[str, Any]:
     """Everything that a placement depends on besides the cell, the map and options."""
     return {
-        "coarse_grid": list(footprint.COARSE_GRID),
+        "samples": {
+            "thin": list(footprint.THIN),
+            "coarse": list(footprint.COARSE),
+        },
         "max_layers": footprint.MAX_LAYERS,
         "attempts": exact.ATTEMPTS,
         "steps_per_square": places.STEPS_PER_SQUARE,
         "yaw_step_deg": places.YAW_STEP_DEG,
         "yaws_per_level": places.YAWS_PER_LEVEL,
         "turns_deg": list(decision.TURNS_DEG),
-        "places_turned": decision.PLACES_TURNED,
+        "places_improved": decision.PLACES_IMPROVED,
         "refine_steps": np.round(refine.FIRST_STEPS, 9).tolist(),
         "refine_rounds": refine.ROUNDS,
+        "refine_min_gain_points": refine.MIN_GAIN_POINTS,
         "margin_points": margins.DROP_POINTS,
         "margin_shifts_m": list(margins.SHIFTS_M),
         "margin_turns_rad": np.round(margins.TURNS_RAD, 9).tolist(),

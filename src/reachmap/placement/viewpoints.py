@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from reachmap._typing import FloatArray, IntArray
+from reachmap._typing import BoolArray, FloatArray, IntArray
 from reachmap.cell.model import BinSpec, CameraSpec
 from reachmap.geometry import inverse_transform, transform_from_parts
 
@@ -89,11 +89,13 @@ def seen_from(T_bin_camera: FloatArray, view: View, camera: CameraSpec) -> IntAr
     rim = _in_camera(T_camera_bin, view.rim)
     near, far = camera.range_m
     depth = volume[..., 2]
-    in_range = ((depth >= near - SLACK_M) & (depth <= far + SLACK_M)).all(axis=1)
-    usable = _in_picture(volume, camera) & in_range
     sight = np.linalg.norm(volume, axis=-1)
-    wishes = 2 * ~_in_picture(rim, camera) + ~(sight <= far + SLACK_M).all(axis=1)
-    return np.where(usable, wishes, NOT_SEEN)
+    near_enough = np.asarray((depth <= far + SLACK_M).all(axis=1), bool)
+    far_enough = np.asarray((depth >= near - SLACK_M).all(axis=1), bool)
+    usable = _in_picture(volume, camera) & near_enough & far_enough
+    no_rim = (~_in_picture(rim, camera)).astype(int)
+    too_far = np.asarray((sight > far + SLACK_M).any(axis=1), int)
+    return np.where(usable, 2 * no_rim + too_far, NOT_SEEN)
 
 
 def picture_corners(
@@ -119,12 +121,12 @@ def _in_camera(T_camera_bin: FloatArray, points: FloatArray) -> FloatArray:
     return np.asarray(points @ np.swapaxes(R, 1, 2) + p[:, None])
 
 
-def _in_picture(points: FloatArray, camera: CameraSpec) -> FloatArray:
+def _in_picture(points: FloatArray, camera: CameraSpec) -> BoolArray:
     """Whether all points (n, m, 3) in camera frames are in the picture, (n,)."""
     slope = np.tan(np.radians(camera.field_of_view_deg) / 2)
     depth = points[..., 2]
     inside = np.abs(points[..., :2]) <= slope * depth[..., None]
-    return np.asarray((inside.all(axis=-1) & (depth > 0)).all(axis=1))
+    return np.asarray((inside.all(axis=-1) & (depth > 0)).all(axis=1), bool)
 
 
 def _orientations() -> FloatArray:
