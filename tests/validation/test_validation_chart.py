@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from toy_truth import clear_rows, toy_grasps
 
-from reachmap.errors import SettingsError
 from reachmap.plots.validation import validation_chart
 from reachmap.tools.validate import validate
 
@@ -56,8 +55,20 @@ def test_points_are_grasps(validation):
     assert (np.asarray(missed)[:, 1] == costs.get_ylim()[1]).all()
 
 
-def test_too_many_groups_are_refused(validation):
-    """A page has room for twenty-four quadrants."""
+def test_many_groups_are_cut_short(validation):
+    """A page has room for twenty-four quadrants; what is left out is said."""
     many = dataclasses.replace(validation, groups=validation.groups * 10)
-    with pytest.raises(SettingsError, match="groups; a chart takes 24"):
-        validation_chart(many)
+    _, bars = validation_chart(many).axes
+    assert len(bars.get_xticks()) == 3 * 24
+    assert bars.get_title(loc="right") == f"first 24 of {len(many.groups)} groups"
+
+
+def test_names_of_files_are_no_formulas(validation):
+    """A list may be called anything; its name is drawn as it is."""
+    (group, *_) = validation.groups
+    odd = dataclasses.replace(
+        validation, groups=(dataclasses.replace(group, label="a $x_{$ b \n c"),)
+    )
+    figure = validation_chart(odd)
+    figure.canvas.draw()
+    assert r"a \$x_{\$ b \n c" in [t.get_text() for t in figure.axes[1].texts]

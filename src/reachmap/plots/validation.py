@@ -11,7 +11,6 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from reachmap.errors import SettingsError
 from reachmap.plots.ranking import TERM_COLOURS, TERM_LABELS
 from reachmap.plots.style import (
     INK,
@@ -23,6 +22,7 @@ from reachmap.plots.style import (
     new_figure,
     put_title,
 )
+from reachmap.ranking.rank_text import printable
 from reachmap.validation.judgement import ORDERS, JudgedList
 from reachmap.validation.statistics import Share
 from reachmap.validation.summary import GroupSummary, OrderFigures, Validation
@@ -30,6 +30,7 @@ from reachmap.validation.summary import GroupSummary, OrderFigures, Validation
 LIST_COLOURS: Final = ("#2f6db3", "#3d9970", "#9467bd", "#b8860b", "#4f4f4f")
 MISS_COLOUR: Final = "#c0392b"
 MAX_GROUPS: Final = 24
+LABEL_WIDTH: Final = 18
 BAR_WIDTH: Final = 0.26
 PLACES: Final = (-0.28, 0.0, 0.28)
 SHORT: Final = ("supplied", "re-ranked", "IK only")
@@ -47,21 +48,18 @@ def validation_chart(validation: Validation) -> Figure:
     Returns
     -------
     Figure
-
-    Raises
-    ------
-    SettingsError
-        There are more groups than fit on a page.
+        Of many groups it shows the first 24, and says so.
     """
-    groups = validation.groups
-    if len(groups) > MAX_GROUPS:
-        raise SettingsError(f"{len(groups)} groups; a chart takes {MAX_GROUPS}")
+    groups = validation.groups[:MAX_GROUPS]
     width = max(2.6, 1.15 * len(groups))
     figure = new_figure(LEFT + SIDE + GAP + width + 0.25, BOTTOM + SIDE + 0.95)
     put_title(figure, LEFT, _title(validation), _subtitle(validation))
     _draw_costs(axes_at(figure, LEFT, BOTTOM, SIDE, SIDE), validation.lists)
     bars = axes_at(figure, LEFT + SIDE + GAP, BOTTOM, width, SIDE)
     _draw_groups(bars, groups, validation.top)
+    if len(validation.groups) > MAX_GROUPS:
+        said = f"first {MAX_GROUPS} of {len(validation.groups)} groups"
+        bars.set_title(said, loc="right", fontsize=7.4, color=MUTED)
     return figure
 
 
@@ -87,6 +85,11 @@ def _subtitle(validation: Validation) -> str:
         f"{c.true_negative} rightly and {c.false_negative} wrongly called unreachable",
     ]
     return " · ".join([*parts, *([f"{outside} outside the map"] if outside else [])])
+
+
+def _plain(label: str) -> str:
+    """A file's name, short, and with no formula in it."""
+    return printable(label, LABEL_WIDTH).replace("$", r"\$")
 
 
 def _draw_costs(axes: Axes, lists: Sequence[JudgedList]) -> None:
@@ -120,7 +123,7 @@ def _cost_legend(axes: Axes, lists: Sequence[JudgedList]) -> None:
     handles = [
         Line2D(
             [], [], linestyle="", marker="o", markersize=4,
-            color=LIST_COLOURS[number % len(LIST_COLOURS)], label=one.label,
+            color=LIST_COLOURS[number % len(LIST_COLOURS)], label=_plain(one.label),
         )
         for number, one in enumerate(lists)
     ]  # fmt: skip
@@ -141,8 +144,8 @@ def _draw_groups(axes: Axes, groups: Sequence[GroupSummary], top: int) -> None:
         for shift, name in zip(PLACES, ORDERS, strict=True):
             _draw_bar(axes, place + shift, group.orders[name], limit)
         axes.annotate(
-            group.label, (place, 0.0), xytext=(0, -40), textcoords="offset points",
-            ha="center", va="top", fontsize=8.0, fontweight="bold", color=INK,
+            _plain(group.label), (place, 0.0), xytext=(0, -40), ha="center", va="top",
+            textcoords="offset points", fontsize=8.0, fontweight="bold", color=INK,
             annotation_clip=False,
         )  # fmt: skip
     axes.set_ylim(0.0, limit)
