@@ -27,7 +27,7 @@ def _test_grasp(
 
 
 @click.command("view")
-@click.argument("artefact", metavar="FILE", type=options.INPUT_FILE)
+@click.argument("source", metavar="FILE", type=options.INPUT_FILE)
 @click.option(
     "--html",
     "page",
@@ -59,7 +59,7 @@ def _test_grasp(
 )
 @options.overwrite_option
 def command(
-    artefact: Path,
+    source: Path,
     page: Path | None,
     test_grasps: tuple[tuple[int, int, int, int], ...],
     port: int,
@@ -68,19 +68,19 @@ def command(
 ) -> None:
     """Look at a cell or an artefact in 3D, in the browser.
 
-    FILE is a workspace map, a placement or a bin map. The cell is drawn with the shapes
-    that collisions are checked on, and the points of the map in the colours of their
-    reachability. A slider chooses the level, a filter the state of the test frames. A
-    click on a point puts the arm there; where it cannot be, the bodies in the way are
-    red. Paths of a bin map are played in the time the arm takes for them. The view is
-    served on this machine alone until Ctrl-C. Needs the extra [view].
+    FILE is a workspace map, a placement or a bin map, or a cell. The cell is drawn with
+    the shapes that collisions are checked on, and the points of the map in the colours
+    of their reachability. A slider chooses the level, a filter the state of the test
+    frames. A click on a point puts the arm there; where it cannot be, the bodies in the
+    way are red. Paths of a bin map are played in the time the arm takes for them. The
+    view is served on this machine alone until Ctrl-C. Needs the extra [view].
 
     Example: reachmap view bin.h5 --html bin-3d.html
     """
     from reachmap.tools.view import ViewOptions, view
 
     written = view(
-        artefact,
+        source,
         page=page,
         test_grasps=test_grasps,
         overwrite=overwrite,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import json
 import re
+import shutil
 import socket
 import sys
 import threading
@@ -237,3 +238,16 @@ def test_a_placement_shows_chosen_bin_and_runner_up(tmp_path: Path) -> None:
     page = page_of(synthetic_placement(), SolidCell.build(loaded))
     assert json.dumps("Bin at")[1:-1] in page
     assert "score" in page
+
+
+@pytest.mark.parametrize("name", ["planar-toy", "cell.yaml"])
+def test_a_cell_can_be_looked_at_before_any_scan(folder: Path, name: str) -> None:
+    """By its shipped name or as a file; there is no scale of colours then."""
+    shipped = Path(__file__).parents[2] / "cells"
+    (folder / "cell.yaml").write_bytes((shipped / "planar-toy.yaml").read_bytes())
+    shutil.copytree(shipped / "planar-toy", folder / "planar-toy")
+    result = run(name, "--html", "page.html")
+    assert result.exit_code == 0, result.output
+    page = (folder / "page.html").read_text()
+    assert "At the scan configuration" in page
+    assert 'id="reachmap-scale"' not in page

@@ -1,4 +1,4 @@
-"""``reachmap view``: an artefact or a cell in 3D, live or as one page."""
+"""``reachmap view``: a cell or an artefact in 3D, live or as one page."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from reachmap.cell.loading import SUFFIXES, LoadedCell, read_cell, shipped_cells
 from reachmap.errors import SettingsError
 from reachmap.maps.any_file import Artefact, read_artefact
 from reachmap.maps.publish import check_output, publish
@@ -28,7 +29,7 @@ class ViewOptions:
 
 
 def view(
-    artefact: Path,
+    source: Path,
     *,
     page: Path | None = None,
     test_grasps: Sequence[tuple[int, int, int, int]] = (),
@@ -37,12 +38,13 @@ def view(
     on_ready: Callable[[str], None] = lambda address: None,
     wait: Callable[[], None] | None = None,
 ) -> Path | None:
-    """Show an artefact until interrupted, or write it as one page with playback.
+    """Show an artefact or a cell until interrupted, or write it as one page.
 
     Parameters
     ----------
-    artefact : Path
-        A workspace map, a placement or a bin map.
+    source : Path
+        A workspace map, a placement or a bin map; or a cell, by its shipped name or as
+        a YAML file.
     page : Path, optional
         Where to write the page; no server is left running then.
     test_grasps : sequence of tuple of int
@@ -77,9 +79,9 @@ def view(
     # Imported here: without the extra there is nothing to load the engines for.
     from reachmap.core.solids import SolidCell
 
-    record = read_artefact(artefact)
+    record, loaded = _read(source)
     paths = _paths(record, test_grasps)
-    cell = SolidCell.build(cell_of_artefact(record.provenance, str(artefact)))
+    cell = SolidCell.build(loaded)
     if page is not None:
         from reachmap.view.page import page_of
 
@@ -102,8 +104,16 @@ def view(
     return None
 
 
+def _read(source: Path) -> tuple[Artefact | None, LoadedCell]:
+    """Read an artefact with its cell, or a cell alone."""
+    if source.suffix in SUFFIXES or str(source) in shipped_cells():
+        return None, read_cell(str(source))
+    record = read_artefact(source)
+    return record, cell_of_artefact(record.provenance, str(source))
+
+
 def _paths(
-    record: Artefact, test_grasps: Sequence[tuple[int, int, int, int]]
+    record: Artefact | None, test_grasps: Sequence[tuple[int, int, int, int]]
 ) -> tuple[int, ...]:
     if not test_grasps:
         return ()

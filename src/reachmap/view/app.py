@@ -36,7 +36,8 @@ class App:
     Parameters
     ----------
     server : viser.ViserServer
-    record : WorkspaceMap, BinMap or BinPlacement
+    record : WorkspaceMap, BinMap, BinPlacement or None
+        None for a cell alone.
     cell : SolidCell
         Of the artefact.
     path : int, optional
@@ -46,7 +47,7 @@ class App:
     def __init__(
         self,
         server: viser.ViserServer,
-        record: Artefact,
+        record: Artefact | None,
         cell: SolidCell,
         path: int | None = None,
     ) -> None:
@@ -74,7 +75,8 @@ class App:
         gui = self.server.gui
         gui.add_html(_paragraph(headline(self.record), self.cell.loaded.cell.name))
         best = self._best_level()
-        with gui.add_folder("Points"):
+        has_points = len(self.points.position) > 0
+        with gui.add_folder("Points", visible=has_points):
             last = len(self.points.levels) - 1
             self.level: Any = gui.add_slider(
                 "level", min=0, max=max(last, 1), step=1, initial_value=best or 0,
@@ -90,7 +92,7 @@ class App:
                 "with a frame", options=(EVERYTHING, *self.points.states())
             )
             self.count: Any = gui.add_html("")
-        with gui.add_folder("Arm"):
+        with gui.add_folder("Arm", visible=has_points):
             self.frame: Any = gui.add_slider(
                 "orientation", min=0, max=1, step=1, initial_value=0, disabled=True
             )

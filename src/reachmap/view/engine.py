@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     import viser
 
 HOST = "127.0.0.1"
+AMBIENT = 1.3
 
 
 def require_viewer() -> None:
@@ -68,19 +69,13 @@ def stop_server(server: viser.ViserServer) -> None:
 
 
 def _light(server: viser.ViserServer) -> None:
-    """Light from all sides and two directions, without shadows, all of it local."""
-    scene = server.scene
-    scene.configure_environment_map(None)
-    scene.configure_default_lights(enabled=False)
-    scene.add_light_ambient("/light/ambient", intensity=0.9)
-    scene.add_light_hemisphere("/light/sky", intensity=0.5)
-    for name, towards, intensity in (
-        ("key", (1.2, -1.6, 4.0), 2.2),
-        ("fill", (2.0, 2.5, 1.0), 0.5),
-    ):
-        scene.add_light_directional(
-            f"/light/{name}", intensity=intensity, position=towards, cast_shadow=False
-        )
+    """Light from the viewer's own lamps, which a recording has from its first frame.
+
+    An environment map would be fetched from elsewhere.
+    """
+    server.scene.configure_environment_map(None)
+    server.scene.configure_default_lights(enabled=True, cast_shadow=False)
+    server.scene.add_light_ambient("/light", intensity=AMBIENT)
 
 
 def free_port(port: int) -> int:

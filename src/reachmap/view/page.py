@@ -22,7 +22,7 @@ from reachmap.view.words import has_bin, headline, legend_name
 PAUSE_S, LEVEL_S = 0.7, 1.6
 
 
-def page_of(record: Artefact, cell: SolidCell, paths: Sequence[int] = ()) -> str:
+def page_of(record: Artefact | None, cell: SolidCell, paths: Sequence[int] = ()) -> str:
     """Write an artefact as a page that needs nothing but a browser.
 
     A bin map plays stored paths from the scan configuration to their grasps, in the
@@ -31,7 +31,8 @@ def page_of(record: Artefact, cell: SolidCell, paths: Sequence[int] = ()) -> str
 
     Parameters
     ----------
-    record : WorkspaceMap, BinMap or BinPlacement
+    record : WorkspaceMap, BinMap, BinPlacement or None
+        None for a cell alone.
     cell : SolidCell
         Of the artefact.
     paths : sequence of int
@@ -50,6 +51,8 @@ def page_of(record: Artefact, cell: SolidCell, paths: Sequence[int] = ()) -> str
             text = _bin_page(server, stage, points, record, paths)
         elif isinstance(record, WorkspaceMap):
             text = _workspace_page(server, stage, points, record)
+        elif record is None:
+            text = str(server.get_scene_serializer().as_html())
         else:
             text = _placement_page(server, stage, points, record)
     finally:
@@ -97,8 +100,8 @@ def _bin_page(
 def _path_words(playback: Playback) -> str:
     layer, y, x, orientation = playback.test_grasp
     return (
-        f"test grasp {layer},{y},{x},{orientation}, {playback.time_s[-1]:.2f} s "
-        "to the grasp and back out"
+        f"test grasp {layer},{y},{x},{orientation} and back out, "
+        f"{playback.time_s[-1]:.2f} s"
     )
 
 

@@ -17,7 +17,7 @@ POLICY = (
 CAPTION = """
 <style>
 #reachmap-caption {{
-  position: fixed; right: 14px; top: 12px; z-index: 30; max-width: min(440px, 60vw);
+  position: fixed; left: 14px; bottom: 58px; z-index: 30; max-width: min(440px, 60vw);
   padding: 10px 14px; border-radius: 8px; background: rgba(255, 255, 255, 0.9);
   box-shadow: 0 1px 6px rgba(0, 0, 0, 0.18); color: #1c1c1c;
   font: 13px/1.4 system-ui, "DejaVu Sans", sans-serif; pointer-events: none;
@@ -32,9 +32,10 @@ CAPTION = """
 #reachmap-ends i {{ font-style: normal; }}
 </style>
 <div id="reachmap-caption"><b>{title}</b><span>{subtitle}</span>
-<div id="reachmap-scale"></div>
-<div id="reachmap-ends"><i>0 %</i><i>{scale}</i><i>100 %</i></div>
-</div>
+{scale}</div>
+"""
+SCALE = """<div id="reachmap-scale"></div>
+<div id="reachmap-ends"><i>0 %</i><i>{name}</i><i>100 %</i></div>
 """
 
 
@@ -46,7 +47,8 @@ def framed(page: str, *, title: str, subtitle: str, scale: str) -> str:
     page : str
         HTML of a recorded scene.
     title, subtitle, scale : str
-        Plain text: what is shown, of which cell, and what the colours mean.
+        Plain text: what is shown, of which cell, and what the colours mean; without
+        a scale none is drawn.
     """
     colours = colour_map("RdYlGn")
     stops = ", ".join(
@@ -56,7 +58,7 @@ def framed(page: str, *, title: str, subtitle: str, scale: str) -> str:
     caption = CAPTION.format(
         title=html.escape(title),
         subtitle=html.escape(subtitle),
-        scale=html.escape(scale),
+        scale=SCALE.format(name=html.escape(scale)) if scale else "",
         stops=stops,
     )
     head = (

@@ -108,8 +108,16 @@ class MapPoints:
         return next(iter(self.shares.values()))
 
 
-def points_of(record: Artefact) -> MapPoints:
-    """Points of any artefact."""
+def points_of(record: Artefact | None) -> MapPoints:
+    """Points of any artefact; none for a cell alone."""
+    if record is None:
+        nothing = np.zeros(0)
+        return MapPoints(
+            position=np.zeros((0, 3)),
+            level=np.zeros(0, np.int64),
+            levels=("no map",),
+            shares={"path reachability": nothing},
+        )
     if isinstance(record, WorkspaceMap):
         return _workspace_points(record)
     if isinstance(record, BinMap):

@@ -8,8 +8,10 @@ from reachmap.maps.statistics import best_level, level_means, saturation_of
 from reachmap.plots.placement import placement_words
 
 
-def headline(record: Artefact) -> str:
+def headline(record: Artefact | None) -> str:
     """Answer of a map: best level, share of test grasps, or where the bin goes."""
+    if record is None:
+        return "At the scan configuration"
     if isinstance(record, WorkspaceMap):
         best = best_level(record.path_reachability)
         if best is None:
@@ -23,16 +25,20 @@ def headline(record: Artefact) -> str:
     return placement_words(record)[0]
 
 
-def has_bin(record: Artefact) -> bool:
+def has_bin(record: Artefact | None) -> bool:
     """Whether the bin was among the obstacles; a workspace is mapped without it."""
+    if record is None:
+        return True
     standing = record.provenance.settings.get("with_bin")
     if isinstance(standing, bool):
         return standing
     return not isinstance(record, WorkspaceMap)
 
 
-def legend_name(record: Artefact) -> str:
-    """What the colours of the points mean."""
+def legend_name(record: Artefact | None) -> str:
+    """What the colours of the points mean; "" where there are no points."""
+    if record is None:
+        return ""
     if isinstance(record, WorkspaceMap | BinMap):
         return "path reachability"
     return "score"
