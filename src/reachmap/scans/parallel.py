@@ -63,7 +63,6 @@ def compute_units(
         Crew(lanes) as crew,
         closing(crew.replies(range(units))) as replies,
     ):
-        stop.at_once = executor == "processes" and workers == 1
         for reply in replies:
             stop.check()
             if reply is None:
