@@ -249,6 +249,11 @@ def test_importing_every_command_imports_no_engine() -> None:
     subprocess.run([sys.executable, "-c", script], check=True)
 
 
+def test_every_command_of_the_table_is_there() -> None:
+    """Hiding is for commands being written; a release has them all."""
+    assert list(COMMANDS) == AVAILABLE
+
+
 @pytest.mark.parametrize("name", AVAILABLE)
 def test_table_line_is_the_first_sentence_of_the_help(name: str) -> None:
     """The quick help and the command's own help say the same."""
