@@ -3,12 +3,21 @@
 from __future__ import annotations
 
 import json
+import logging
 from pathlib import Path
 
 import click
 
 from reachmap.cli.answers import facts_text
-from reachmap.cli.options import INPUT_FILE, cell_option, output_option, scan_options
+from reachmap.cli.options import (
+    DEFAULT_CELL,
+    INPUT_FILE,
+    cell_option,
+    output_option,
+    scan_options,
+)
+
+log = logging.getLogger(__name__)
 
 
 @click.command()
@@ -37,17 +46,19 @@ def command(
 
     PLACEMENT is what place-bin wrote; by default placement.h5 in this folder. It
     holds the cell with its bin and scan configuration, so nothing else is needed.
-    With --cell the bin stands where that cell has it. Each test grasp is planned
-    several times and every attempt is kept. Ctrl-C loses nothing: the same
-    command goes on.
+    With --cell, or where there is no placement.h5, the bin stands where the cell has
+    it: the cell named, that of workspace.h5 in this folder, or the shipped UR5 cell.
+    Each test grasp is planned several times and every attempt is kept. Ctrl-C loses
+    nothing: the same command goes on.
 
     Example: reachmap bin-scan placement.h5 --set bin_scan.repeats=1
     """
     from reachmap.tools.bin_scan import bin_scan, estimate_bin_scan, summary_of_bin
     from reachmap.tools.options import RunOptions, written_by
 
+    workspace = None
     if placement is None and cell is None:
-        placement = Path("placement.h5")
+        placement, workspace = _found_here()
     run = RunOptions(
         workers=workers,
         executor=executor,
@@ -57,10 +68,30 @@ def command(
         quiet=not progress,
     )
     if dry_run:
-        facts = estimate_bin_scan(placement, cell=cell, overrides=overrides, run=run)
+        facts = estimate_bin_scan(
+            placement, cell=cell, workspace=workspace, overrides=overrides, run=run
+        )
     else:
         result = bin_scan(
-            placement, output, cell=cell, overrides=overrides, seed=seed, run=run
+            placement,
+            output,
+            cell=cell,
+            workspace=workspace,
+            overrides=overrides,
+            seed=seed,
+            run=run,
         )
         facts = {"output": str(written_by(output, run))} | summary_of_bin(result)
     click.echo(json.dumps(facts) if as_json else facts_text(facts))
+
+
+def _found_here() -> tuple[Path | None, Path | None]:
+    """Placement to scan, or else the workspace map whose cell to scan."""
+    placement, workspace = Path("placement.h5"), Path("workspace.h5")
+    if placement.exists():
+        return placement, None
+    if workspace.exists():
+        log.warning("no placement.h5 here: the bin stands where workspace.h5 has it")
+        return None, workspace
+    log.warning("no placement.h5 here: the bin stands where %s has it", DEFAULT_CELL)
+    return None, None

@@ -83,6 +83,7 @@ def test_a_map_of_the_wrong_kind_is_named(toy):
     )
     result = reachmap(toy, "rank", "grasps.json", "--map", "workspace.h5")
     refused(result, "workspace.h5", "bin")
+    refused(reachmap(toy, "bin-scan", "workspace.h5"), "workspace.h5", "placement")
 
 
 def test_grasps_without_a_frame_are_refused(toy):
@@ -114,6 +115,6 @@ def test_a_folder_that_cannot_be_written_is_named(toy):
 
 
 def test_a_missing_input_names_the_command_that_makes_it(toy):
-    """bin-scan without a placement says where placements come from."""
-    refused(reachmap(toy, "bin-scan"), "placement.h5")
+    """A command without its input says where that comes from."""
+    refused(reachmap(toy, "bin-scan", "placement.h5"), "place-bin")
     refused(reachmap(toy, "heatmap"), "workspace.h5")

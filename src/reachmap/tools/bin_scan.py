@@ -12,7 +12,7 @@ import numpy as np
 from reachmap._typing import BoolArray
 from reachmap.cell.loading import read_cell
 from reachmap.core.scene import Scene
-from reachmap.maps import BinMap, Status, read_placement
+from reachmap.maps import BinMap, Status, read_placement, read_workspace_map
 from reachmap.sampling.frames import FrameGrid, bin_test_frames
 from reachmap.scans.bin_scan import CHECKS_UNCONNECTED, bin_work, plan_grasp
 from reachmap.scans.document import checking_settings, roadmap_settings, scan_document
@@ -39,6 +39,7 @@ def bin_scan(
     output: Path,
     *,
     cell: str | None = None,
+    workspace: Path | None = None,
     overrides: Sequence[str] = (),
     seed: int | None = None,
     run: RunOptions = IN_PROCESS,
@@ -54,6 +55,8 @@ def bin_scan(
         The artefact to write.
     cell : str, optional
         Instead of the placement's cell: shipped name or path.
+    workspace : Path, optional
+        Artefact of workspace-scan: without a placement and a cell, its cell is taken.
     overrides : sequence of str
         ``key.path=value``.
     seed : int, optional
@@ -69,7 +72,9 @@ def bin_scan(
     ReachmapError
         See :mod:`reachmap.errors`.
     """
-    loaded, source = load_placed_cell(placement, cell, with_seed(overrides, seed))
+    loaded, source = load_placed_cell(
+        placement, cell, with_seed(overrides, seed), workspace
+    )
     scene = Scene.build(loaded, with_bin=True)
     scene.require_free_scan_configuration()
     document = scan_document(
@@ -100,14 +105,22 @@ def bin_scan(
 
 
 def load_placed_cell(
-    placement: Path | None, cell: str | None, overrides: Sequence[str]
+    placement: Path | None,
+    cell: str | None,
+    overrides: Sequence[str],
+    workspace: Path | None = None,
 ) -> tuple[LoadedCell, str]:
-    """Cell to scan, and the content hash of its placement ("" without one)."""
-    if placement is None or cell is not None:
+    """Cell to scan, and the content hash of the artefact it is from ("" for none)."""
+    if cell is not None or (placement is None and workspace is None):
         return read_cell(cell or "ur5-eye-in-hand", overrides), ""
-    placed = read_placement(placement)
-    loaded = cell_of_artefact(placed.provenance, str(placement), overrides)
-    return loaded, placed.stamp.content_sha256
+    if placement is not None:
+        placed = read_placement(placement)
+        loaded = cell_of_artefact(placed.provenance, str(placement), overrides)
+        return loaded, placed.stamp.content_sha256
+    assert workspace is not None
+    mapped = read_workspace_map(workspace)
+    loaded = cell_of_artefact(mapped.provenance, str(workspace), overrides)
+    return loaded, mapped.stamp.content_sha256
 
 
 def summary_of_bin(bin_map: BinMap | None) -> dict[str, Any]:
@@ -128,11 +141,12 @@ def estimate_bin_scan(
     placement: Path | None,
     *,
     cell: str | None,
+    workspace: Path | None = None,
     overrides: Sequence[str],
     run: RunOptions,
 ) -> dict[str, Any]:
     """Say what a scan would do, timed on a few test grasps; nothing is written."""
-    loaded, _ = load_placed_cell(placement, cell, overrides)
+    loaded, _ = load_placed_cell(placement, cell, overrides, workspace)
     scene = Scene.build(loaded, with_bin=True)
     scene.require_free_scan_configuration()
     grid = _grid(loaded, scene)
