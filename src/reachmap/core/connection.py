@@ -8,6 +8,7 @@ over the component. Failure is not proof of absence: the budget spent is recorde
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -63,6 +64,7 @@ def connect(
     *,
     attempts: int,
     seed: int,
+    on_frame: Callable[[], object] = lambda: None,
 ) -> Connection:
     """Find which frames the scan configuration is connected to.
 
@@ -78,12 +80,15 @@ def connect(
     attempts : int
         Attempts of the planner per component.
     seed : int
+    on_frame : callable
+        Called for each frame that is reached by exploring, to report progress.
     """
     roadmap = Roadmap.of(start, goals, frame)
     motions = planner.motions
     candidates = CandidateMotions.of(roadmap.goal_array, motions.checker.reach_m)
     connector = _Connector(roadmap, planner, seed)
-    connector.explore(Explorer(roadmap, candidates, motions), attempts)
+    explorer = Explorer(roadmap, candidates, motions, on_frame)
+    connector.explore(explorer, attempts)
     connector.connect(components_of_open_goals(roadmap, candidates, motions), attempts)
     return connector.connection()
 

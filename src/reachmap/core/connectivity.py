@@ -11,7 +11,7 @@ is verified, and the route to each is the shortest over verified motions.
 from __future__ import annotations
 
 import heapq
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -82,20 +82,17 @@ class CandidateMotions:
         weighted = Q * weight
         tree = cKDTree(weighted)
         count = min(neighbours + 1, len(Q))
-        _, near = tree.query(weighted, k=count)
+        _, near = tree.query(weighted, k=count, workers=-1)
         a = np.repeat(np.arange(len(Q)), count)
         b = np.asarray(near, np.int64).ravel()
         _, around = tree.query(weighted[START], k=min(START_NEIGHBOURS, len(Q)))
         a = np.concatenate([a, np.full(np.size(around), START)])
         b = np.concatenate([b, np.atleast_1d(around)])
         usable = (a != b) & (np.abs(Q[a] - Q[b]).max(axis=1) <= LONGEST_JOIN_RAD)
-        both = np.stack(
-            [
-                np.concatenate([a[usable], b[usable]]),
-                np.concatenate([b[usable], a[usable]]),
-            ]
-        )
-        rows, node = np.unique(both, axis=1)
+        a, b = a[usable], b[usable]
+        # Both directions of each motion, once: a pair as one number sorts fast.
+        key = np.unique(np.concatenate([a * len(Q) + b, b * len(Q) + a]))
+        rows, node = np.divmod(key, len(Q))
         return cls(
             begin=np.searchsorted(rows, np.arange(len(Q) + 1)),
             node=node,
@@ -158,8 +155,9 @@ class Roadmap:
 
     def open_goals(self) -> BoolArray:
         """Nodes whose frame has no connected goal, shape (goals + 1,)."""
-        frames = np.isin(self.frame, self.frames_reached(), invert=True)
-        return np.concatenate([[False], frames])
+        done = np.zeros(int(self.frame.max(initial=-1)) + 1, bool)
+        done[self.frame[self.reached[1:]]] = True
+        return np.concatenate([[False], ~done[self.frame]])
 
     def add_path(self, path: FloatArray, first: int, last: int) -> None:
         """Record a verified path between two nodes, way-points included."""
@@ -223,12 +221,19 @@ class Explorer:
     candidates : CandidateMotions
         Of the roadmap's start and goals.
     motions : MotionChecker
+    on_frame : callable
+        Called for each frame that is reached, to report progress.
     """
 
     def __init__(
-        self, roadmap: Roadmap, candidates: CandidateMotions, motions: MotionChecker
+        self,
+        roadmap: Roadmap,
+        candidates: CandidateMotions,
+        motions: MotionChecker,
+        on_frame: Callable[[], object] = lambda: None,
     ) -> None:
         self._roadmap, self._motions = roadmap, motions
+        self._on_frame = on_frame
         self._Q = roadmap.goal_array
         self._distance = np.full(len(self._Q), np.inf)
         self._frame_done = np.zeros(int(roadmap.frame.max(initial=-1)) + 1, bool)
@@ -275,6 +280,7 @@ class Explorer:
         self._distance[node] = distance
         if node != START:
             self._frame_done[self._roadmap.frame[node - 1]] = True
+            self._on_frame()
 
     def _motions_from(self, node: int) -> list[tuple[float, int, int]]:
         here = float(self._distance[node])

@@ -88,14 +88,30 @@ class MotionBound:
         sliding = axis * np.where(self._chain.is_revolute, 0.0, half_change)[:, None]
         # Velocity of a point X on joint k: Σ_{j ≤ k} (a_j × (X − o_j)) Δ_j.
         angular = np.cumsum(turning, axis=1)
-        linear = np.cumsum(sliding + np.cross(origin, turning), axis=1)
+        linear = np.cumsum(sliding + _cross(origin, turning), axis=1)
         corners = frames[..., :3, :3] @ self._corners + origin[..., None]
-        velocity = np.cross(angular[..., None], corners, axisa=2, axisb=2, axisc=2)
-        speed = np.linalg.norm(velocity + linear[..., None], axis=2)
-        first = speed.max(axis=(1, 2))
+        # Coordinates first, and no np.cross: this is called for every motion.
+        ux, uy, uz = (linear[:, :, k, None] for k in range(3))
+        wx, wy, wz = (angular[:, :, k, None] for k in range(3))
+        x, y, z = corners[:, :, 0], corners[:, :, 1], corners[:, :, 2]
+        square = (ux + wy * z - wz * y) ** 2
+        square += (uy + wz * x - wx * z) ** 2
+        square += (uz + wx * y - wy * x) ** 2
+        first = np.sqrt(square.max(axis=(1, 2)))
         size = np.abs(half_change)
         second = size[self._chain.is_revolute].sum() * float(size @ self._reach_m)
         return np.asarray(first + second)
+
+
+def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Cross products along the last axis, for small arrays faster than numpy's."""
+    ax, ay, az = a[..., 0], a[..., 1], a[..., 2]
+    bx, by, bz = b[..., 0], b[..., 1], b[..., 2]
+    c = np.empty(a.shape)
+    c[..., 0] = ay * bz - az * by
+    c[..., 1] = az * bx - ax * bz
+    c[..., 2] = ax * by - ay * bx
+    return c
 
 
 def _corners_by_joint(chain: SerialChain, model: Any, geometry: Any) -> FloatArray:

@@ -11,12 +11,18 @@ from reachmap.core.connection import ROADMAP_PLANNER, Connection, connect
 from reachmap.core.planning import Planner
 from reachmap.core.scene import Scene
 from reachmap.maps import Status
+from reachmap.scans.progress import Progress
 from reachmap.scans.survey import MAX_COUNT, Survey
 from reachmap.scans.workspace_results import FrameResults
 
 
 def connect_survey(
-    scene: Scene, survey: Survey, *, attempts: int, seed: int
+    scene: Scene,
+    survey: Survey,
+    *,
+    attempts: int,
+    seed: int,
+    progress: Progress | None = None,
 ) -> Connection:
     """Connect the goals of a survey to the scan configuration.
 
@@ -27,19 +33,26 @@ def connect_survey(
     attempts : int
         Attempts of the planner per component.
     seed : int
+    progress : Progress, optional
+        Counts frames as they are reached.
     """
+    progress = progress or Progress("", quiet=True)
+    progress.begin(len(np.unique(survey.frame)))
     scene.checker.reset()
     planner = Planner(
         scene.motions, scene.robot.lower_rad, scene.robot.upper_rad, ROADMAP_PLANNER
     )
-    return connect(
+    connection = connect(
         scene.scan_configuration,
         survey.goals,
         survey.frame,
         planner,
         attempts=attempts,
         seed=seed,
+        on_frame=lambda: progress.add(1, 1),
     )
+    progress.end()
+    return connection
 
 
 def results_of_connection(survey: Survey, connection: Connection) -> FrameResults:

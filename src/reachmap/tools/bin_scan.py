@@ -90,7 +90,9 @@ def bin_scan(
         executor=run.executor,
         progress=Progress("bin-scan survey", quiet=run.quiet),
     )
-    connected = _connected(scene, survey)
+    connected = _connected(
+        scene, survey, Progress("bin-scan connect", quiet=run.quiet)
+    )
     outcome = run_scan(
         bin_work(loaded, document | {"grasps": len(survey.status)}, survey, connected),
         output=output,
@@ -166,11 +168,15 @@ def estimate_bin_scan(
     }
 
 
-def _connected(scene: Scene, survey: Survey) -> BoolArray:
+def _connected(scene: Scene, survey: Survey, progress: Progress) -> BoolArray:
     """Which test grasps the roadmap proves reachable, shape (grasps,)."""
     cell = scene.loaded.cell
     connection = connect_survey(
-        scene, survey, attempts=cell.bin_scan.repeats, seed=cell.seed
+        scene,
+        survey,
+        attempts=cell.bin_scan.repeats,
+        seed=cell.seed,
+        progress=progress,
     )
     connected = np.zeros(len(survey.status), bool)
     connected[connection.roadmap.frames_reached()] = True

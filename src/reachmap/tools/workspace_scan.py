@@ -120,7 +120,11 @@ def _scan_by_roadmap(
     spec = scene.loaded.cell.workspace_scan
     with clock.phase("connect"):
         connection = connect_survey(
-            scene, survey, attempts=spec.repeats, seed=scene.loaded.cell.seed
+            scene,
+            survey,
+            attempts=spec.repeats,
+            seed=scene.loaded.cell.seed,
+            progress=Progress("workspace-scan connect", quiet=run.quiet),
         )
     results = results_of_connection(survey, connection)
     return assemble_workspace_map(document, results, run=clock.finish())
