@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 
-from test_wrong_inputs import reachmap
+from command_line import reachmap
+
 
 def test_bin_scan_takes_the_cell_of_the_workspace_map(tmp_path):
     """Without a placement the bin stands where the scanned cell has it."""

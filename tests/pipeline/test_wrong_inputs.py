@@ -5,24 +5,11 @@ from __future__ import annotations
 import os
 import shutil
 import subprocess
-import sys
-from pathlib import Path
 
 import pytest
+from command_line import reachmap
 
 from reachmap.cell.loading import shipped_cells
-
-
-def reachmap(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
-    """Run the command in a folder, as a user would."""
-    return subprocess.run(
-        [sys.executable, "-m", "reachmap", *arguments],
-        cwd=folder,
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=False,
-    )
 
 
 def refused(result: subprocess.CompletedProcess[str], *words: str) -> list[str]:
