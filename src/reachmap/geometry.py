@@ -2,12 +2,13 @@
 
 Poses are 4×4 homogeneous matrices named ``T_<to>_<from>``: ``T_a_b`` maps points
 given in frame b into frame a. Quaternions are ``wxyz``, unit, with ``w >= 0``.
+
+The few conversions are written out, as importing scipy's takes longer than ranking.
 """
 
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from reachmap._typing import FloatArray
 
@@ -48,23 +49,65 @@ def inverse_transform(T: FloatArray) -> FloatArray:
 
 def rotation_from_rpy_deg(rpy_deg: FloatArray) -> FloatArray:
     """Roll, pitch, yaw [deg] about fixed x, y, z (the URDF order), (..., 3, 3)."""
-    angles = np.atleast_2d(np.asarray(rpy_deg, float))
-    R = Rotation.from_euler("xyz", angles, degrees=True).as_matrix()
-    return np.asarray(R.reshape(*np.shape(rpy_deg)[:-1], 3, 3))
+    angles = np.radians(np.asarray(rpy_deg, float))
+    (cr, cp, cy), (sr, sp, sy) = (
+        np.moveaxis(values, -1, 0) for values in (np.cos(angles), np.sin(angles))
+    )
+    R = [
+        [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+        [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+        [-sp, cp * sr, cp * cr],
+    ]
+    return np.moveaxis(np.array(R), (0, 1), (-2, -1))
 
 
 def rotation_from_quaternion_wxyz(quaternion: FloatArray) -> FloatArray:
-    """Rotation matrices of quaternions ``wxyz``, (..., 4) to (..., 3, 3)."""
+    """Rotation matrices of quaternions ``wxyz`` of any length, (..., 4) to (..., 3, 3).
+
+    Raises
+    ------
+    ValueError
+        A quaternion is zero.
+    """
     q = np.asarray(quaternion, float)
-    flat = np.roll(q.reshape(-1, 4), -1, axis=1)
-    return np.asarray(Rotation.from_quat(flat).as_matrix().reshape(*q.shape[:-1], 3, 3))
+    length = np.linalg.norm(q, axis=-1, keepdims=True)
+    if not (length > 0).all():
+        raise ValueError("a quaternion of length 0 is no rotation")
+    w, x, y, z = np.moveaxis(q / length, -1, 0)
+    R = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.moveaxis(np.array(R), (0, 1), (-2, -1))
 
 
 def quaternion_wxyz_from_rotation(R: FloatArray) -> FloatArray:
-    """Unit quaternions ``wxyz`` with ``w >= 0``, (..., 3, 3) to (..., 4)."""
+    """Unit quaternions ``wxyz``, (..., 3, 3) to (..., 4).
+
+    ``w >= 0``; of a half turn, the first coordinate that is not 0 is positive. The
+    entries of R give the matrix 4 q qᵀ; its row with the largest diagonal element is q
+    up to scale, without cancellation.
+    """
     R = np.asarray(R, float)
-    flat = Rotation.from_matrix(R.reshape(-1, 3, 3)).as_quat(canonical=True)
-    return np.asarray(np.roll(flat, 1, axis=1).reshape(*R.shape[:-2], 4))
+    m = R.reshape(-1, 3, 3)
+    outer = np.empty((len(m), 4, 4))
+    xx, yy, zz = m[:, 0, 0], m[:, 1, 1], m[:, 2, 2]
+    for k, diagonal in enumerate(
+        (1 + xx + yy + zz, 1 + xx - yy - zz, 1 - xx + yy - zz, 1 - xx - yy + zz)
+    ):
+        outer[:, k, k] = diagonal
+    for j, i in ((0, 1), (0, 2), (1, 2)):
+        k = 3 - i - j
+        outer[:, i + 1, j + 1] = outer[:, j + 1, i + 1] = m[:, i, j] + m[:, j, i]
+        sign = 1.0 if k != 1 else -1.0
+        outer[:, 0, k + 1] = outer[:, k + 1, 0] = sign * (m[:, i, j] - m[:, j, i])
+    rows = np.arange(len(m))
+    q = outer[rows, np.argmax(np.diagonal(outer, axis1=1, axis2=2), axis=1)]
+    q /= np.linalg.norm(q, axis=1, keepdims=True)
+    first = q[rows, np.argmax(q != 0.0, axis=1)]
+    q = np.where(first[:, None] < 0, -q, q) + 0.0
+    return np.asarray(q.reshape(*R.shape[:-2], 4))
 
 
 def rotation_angle(R_a: FloatArray, R_b: FloatArray) -> FloatArray:

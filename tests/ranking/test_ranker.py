@@ -264,8 +264,8 @@ def test_every_place_in_the_bin_is_inside():
     size = np.array([0.36, 0.26, 0.0])
     p = (rng.random((2000, 3)) - 0.5) * size
     p[:, 2] = rng.uniform(0.028, 0.065, len(p))
-    _, nearest = RANKER._tree.query(in_base(p))
-    assert not outside_map(in_base(p), nearest, RANKER.table).any()
+    _, nearest = RANKER._tree.query(in_base(p), 1)
+    assert not outside_map(in_base(p), nearest[:, 0], RANKER.table).any()
 
 
 def test_layers_extend_the_map_upwards():

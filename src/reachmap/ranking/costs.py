@@ -10,7 +10,6 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from reachmap._typing import BoolArray, FloatArray, IntArray
 from reachmap.ranking.matching import (
@@ -18,9 +17,9 @@ from reachmap.ranking.matching import (
     Matches,
     Queries,
     match_at,
-    nearest_points,
     worth_of,
 )
+from reachmap.ranking.nearest import NearestPoints
 from reachmap.ranking.table import GraspTable
 
 # Beyond half a grid diagonal sideways, and so far above or below the layers: grasp
@@ -85,7 +84,7 @@ def blended_terms(
     queries: Queries,
     matches: Matches,
     table: GraspTable,
-    tree: cKDTree,
+    tree: NearestPoints,
     table_cost: FloatArray,
     neighbours: int,
 ) -> FloatArray:
@@ -127,9 +126,11 @@ def blended_terms(
     return np.asarray(blend / total[:, None])
 
 
-def _in_order(points: FloatArray, tree: cKDTree, k: int) -> tuple[FloatArray, IntArray]:
+def _in_order(
+    points: FloatArray, tree: NearestPoints, k: int
+) -> tuple[FloatArray, IntArray]:
     """Nearest points by distance, equal ones in map order, shapes (n, k)."""
-    distance, point = nearest_points(points, tree, k + TIED_POINTS)
+    distance, point = tree.query(points, k + TIED_POINTS)
     order = np.lexsort((point, np.round(distance, 9)), axis=1)[:, :k]
     return (
         np.take_along_axis(distance, order, axis=1),

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from reachmap._typing import BoolArray, FloatArray, IntArray
 from reachmap.geometry import direction_angle
+from reachmap.ranking.nearest import NearestPoints
 from reachmap.ranking.table import GraspTable, quaternion_angle
 
 TIE_M: Final = 1e-6
@@ -76,13 +76,8 @@ class Matches:
     angle: FloatArray
 
 
-def build_tree(table: GraspTable) -> cKDTree:
-    """Build the k-d tree over test points; it may be queried from several threads."""
-    return cKDTree(table.points)
-
-
 def match(
-    queries: Queries, table: GraspTable, tree: cKDTree, cost: FloatArray
+    queries: Queries, table: GraspTable, tree: NearestPoints, cost: FloatArray
 ) -> Matches:
     """Find the nearest test grasp of each grasp, as Algorithm 1 does.
 
@@ -90,13 +85,13 @@ def match(
     ----------
     queries : Queries
     table : GraspTable
-    tree : cKDTree
+    tree : NearestPoints
         Of ``table.points``.
     cost : array, shape (points, orientations)
         J of each test grasp, inf where unreachable; decides ties.
     """
     worth = worth_of(cost)
-    distance, point = nearest_points(queries.points, tree, 2)
+    distance, point = tree.query(queries.points, 2)
     matches = match_at(queries, table, point[:, 0], distance[:, 0], worth)
     if distance.shape[1] > 1:
         # Few grasps lie midway between points; only they are looked at again.
@@ -113,18 +108,6 @@ def worth_of(cost: FloatArray) -> FloatArray:
     unreachable test grasp that ties still wins over one that does not tie.
     """
     return np.minimum(np.round(cost, 12), 1e300)
-
-
-def nearest_points(
-    points: FloatArray, tree: cKDTree, k: int
-) -> tuple[FloatArray, IntArray]:
-    """Distances [m] and numbers of the k nearest test points, shapes (n, k).
-
-    Fewer columns when the map has fewer points.
-    """
-    k = min(k, tree.n)
-    distance, index = tree.query(points, k=k)
-    return distance.reshape(-1, k), np.asarray(index, np.int64).reshape(-1, k)
 
 
 def match_at(
@@ -158,7 +141,9 @@ def match_at(
     )
 
 
-def tied(query: Queries, table: GraspTable, tree: cKDTree) -> tuple[IntArray, IntArray]:
+def tied(
+    query: Queries, table: GraspTable, tree: NearestPoints
+) -> tuple[IntArray, IntArray]:
     """List the test grasps that tie for one grasp, in map order.
 
     Parameters
@@ -180,7 +165,7 @@ def _rematch(
     rows: IntArray,
     queries: Queries,
     table: GraspTable,
-    tree: cKDTree,
+    tree: NearestPoints,
     worth: FloatArray,
 ) -> None:
     """Match rows again over all points that tie in φ1."""
@@ -196,10 +181,10 @@ def _rematch(
 
 
 def _tied_points(
-    queries: Queries, table: GraspTable, tree: cKDTree
+    queries: Queries, table: GraspTable, tree: NearestPoints
 ) -> tuple[FloatArray, IntArray, BoolArray]:
     """Nearest points (n, k), and which of their orientations tie (n, k, m)."""
-    distance, point = nearest_points(queries.points, tree, TIED_POINTS)
+    distance, point = tree.query(queries.points, TIED_POINTS)
     # In map order, so that "the first" means the same on every machine.
     order = np.argsort(point, axis=1)
     point = np.take_along_axis(point, order, axis=1)

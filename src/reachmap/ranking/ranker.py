@@ -17,7 +17,8 @@ from reachmap.ranking.costs import (
     outside_map,
 )
 from reachmap.ranking.frames import frames_of
-from reachmap.ranking.matching import Matches, Queries, build_tree, match, tied
+from reachmap.ranking.matching import Matches, Queries, match, tied
+from reachmap.ranking.nearest import NearestPoints
 from reachmap.ranking.order import OUTSIDE_MAP, Ranking, stable_order
 from reachmap.ranking.queries import queries_from_arrays
 from reachmap.ranking.settings import RankSettings, Roll
@@ -48,7 +49,7 @@ class Ranker:
         self.table: GraspTable = table_from_bin_map(bin_map)
         self.frames: Mapping[str, FloatArray] = frames_of(bin_map)
         self.stamp: Stamp = bin_map.stamp
-        self._tree = build_tree(self.table)
+        self._tree = NearestPoints(self.table.points)
 
     @classmethod
     def from_map(cls, path: str | Path) -> Ranker:

@@ -90,9 +90,7 @@ def bin_scan(
         executor=run.executor,
         progress=Progress("bin-scan survey", quiet=run.quiet),
     )
-    connected = _connected(
-        scene, survey, Progress("bin-scan connect", quiet=run.quiet)
-    )
+    connected = _connected(scene, survey, Progress("bin-scan connect", quiet=run.quiet))
     outcome = run_scan(
         bin_work(loaded, document | {"grasps": len(survey.status)}, survey, connected),
         output=output,
