@@ -9,7 +9,12 @@ from scenes import scene_of
 
 from reachmap.cell.planner import PlannerSpec, SimplificationSpec
 from reachmap.core.planning import Planner
-from reachmap.core.simplification import cut_corners, shorten, skip_waypoints
+from reachmap.core.simplification import (
+    cut_corners,
+    end_at_nearer_goal,
+    shorten,
+    skip_waypoints,
+)
 from reachmap.core.timing import path_length_rad
 from reachmap.sampling.frames import bin_test_frames
 from reachmap.scans.survey import survey_frames
@@ -164,6 +169,44 @@ def test_shortening_goes_towards_the_tangents():
     assert path_length_rad(short) >= best - 1e-9
     assert all(around_a_disc(a, b) for a, b in zip(short[:-1], short[1:], strict=True))
     np.testing.assert_array_equal(short[[0, -1]], [start, end])
+
+
+def test_a_path_ends_at_the_goal_of_the_shortest_way():
+    """Of all ways along the path and straight to a goal, the shortest free one wins."""
+    rng = np.random.default_rng(3)
+    for _ in range(50):
+        path, goals = rng.normal(size=(5, 2)), rng.normal(size=(6, 2))
+        path[-1] = goals[0]
+
+        def is_free(a, b):
+            return bool((a + b)[0] > -0.5)
+
+        arc = np.r_[0.0, np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))]
+        ways = [
+            arc[k] + np.linalg.norm(goal - path[k])
+            for k in range(4)
+            for goal in goals
+            if is_free(path[k], goal)
+        ]
+        short = end_at_nearer_goal(path, goals, is_free)
+        length = np.linalg.norm(np.diff(short, axis=0), axis=1).sum()
+        assert length == pytest.approx(min([arc[-1], *ways]), abs=2e-3)
+        assert (short[-1] == goals).all(axis=1).any()
+        np.testing.assert_array_equal(short[0], path[0])
+
+
+def test_attempts_at_a_choice_of_goals_are_much_alike():
+    """In free space every attempt ends at the nearest goal, straight."""
+    scene = scene_of("planar-toy", with_bin=False)
+    goals = np.array([[0.5, 0.1, 0.0], [0.3, 0.3, 0.3], [-0.4, 0.0, 0.6]])
+    goals = scene.scan_configuration + goals[:, : scene.robot.dof]
+    free = np.array([scene.checker.is_free(q) for q in goals])
+    goals = goals[free]
+    planner = planner_of(scene)
+    nearest = np.linalg.norm(goals - scene.scan_configuration, axis=1).min()
+    for seed in range(1, 6):
+        result = planner.plan(scene.scan_configuration, goals, seed)
+        assert path_length_rad(result.path) == pytest.approx(nearest, abs=2e-3)
 
 
 def test_shortening_never_lengthens():

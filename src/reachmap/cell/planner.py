@@ -24,6 +24,9 @@ class SimplificationSpec(Record):
         description="shortcut: vertex reduction and shortcuts; simplify_max: OMPL's.",
     )
     tries: int = Field(40, ge=0, le=100000, description="Corners tried.")
+    other_goals: bool = Field(
+        True, description="End at another goal of the frame where that is shorter."
+    )
 
 
 class PlannerSpec(Record):

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from reachmap._typing import FloatArray, IntArray
-from reachmap.cell.planner import PlannerSpec
+from reachmap.cell.planner import PlannerSpec, SimplificationSpec
 from reachmap.core.connectivity import (
     START,
     CandidateMotions,
@@ -32,7 +32,13 @@ SMALL_COMPONENT = 40
 CHECKS_LARGE = 20_000
 CHECKS_SMALL = 2_000
 
-ROADMAP_PLANNER = PlannerSpec(name="RRTConnect", range_rad=0.5, max_checks=CHECKS_LARGE)
+# Where in a component a plan arrives does not matter.
+ROADMAP_PLANNER = PlannerSpec(
+    name="RRTConnect",
+    range_rad=0.5,
+    max_checks=CHECKS_LARGE,
+    simplification=SimplificationSpec(other_goals=False),
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -129,7 +129,7 @@ class Planner:
                 break
             cpu_0 = time.thread_time()
             with budget.paused():
-                path = self._shorten_and_verify(search, seed)
+                path = self._shorten_and_verify(search, goals, seed)
             shortening += time.thread_time() - cpu_0
             unverified += path is None
         return PlanResult(
@@ -199,7 +199,9 @@ class Planner:
             planner.setGoalBias(self.spec.goal_bias)
         return planner
 
-    def _shorten_and_verify(self, search: _Search, seed: int) -> FloatArray | None:
+    def _shorten_and_verify(
+        self, search: _Search, goals: FloatArray, seed: int
+    ) -> FloatArray | None:
         """Shorten at the planning step; where that fails to verify, more carefully."""
         motions, settings = self.motions, self.spec.simplification
         raw = search.waypoints()
@@ -210,7 +212,13 @@ class Planner:
             return short if motions.path_is_verified(short) else None
         for is_free in (motions.is_free, motions.is_verified):
             rng = np.random.default_rng(seed)
-            short = shorten(raw, is_free, tries=settings.tries, rng=rng)
+            short = shorten(
+                raw,
+                is_free,
+                tries=settings.tries,
+                rng=rng,
+                goals=goals if settings.other_goals else None,
+            )
             if motions.path_is_verified(short):
                 return short
         return None

@@ -1,9 +1,10 @@
 """Shortening of a found path.
 
 First every way-point that can be skipped is skipped, looking from the far end by
-halving; then random pairs of points on the path are joined where that is shorter
-(Geraerts and Overmars, "Creating high-quality paths for motion planning", 2007). The
-work is counted in tries, so the result depends on the seed alone.
+halving; then the path ends at another goal if one is nearer; then random pairs of
+points on the path are joined where that is shorter (Geraerts and Overmars, "Creating
+high-quality paths for motion planning", 2007). The work is counted in tries, so the
+result depends on the seed alone.
 """
 
 from __future__ import annotations
@@ -24,8 +25,9 @@ def shorten(
     *,
     tries: int,
     rng: np.random.Generator,
+    goals: FloatArray | None = None,
 ) -> FloatArray:
-    """Skip way-points, then cut corners.
+    """Skip way-points, look for a nearer goal, then cut corners.
 
     Parameters
     ----------
@@ -35,13 +37,18 @@ def shorten(
     tries : int
         Corners that are tried.
     rng : numpy.random.Generator
+    goals : array, shape (k, dof), optional
+        Configurations at any of which the path may end.
 
     Returns
     -------
     array, shape (m, dof)
-        Ends unchanged, never longer.
+        Never longer; ends as before, or at one of the goals.
     """
-    return cut_corners(skip_waypoints(path, is_free), is_free, tries=tries, rng=rng)
+    path = skip_waypoints(path, is_free)
+    if goals is not None:
+        path = end_at_nearer_goal(path, goals, is_free)
+    return cut_corners(path, is_free, tries=tries, rng=rng)
 
 
 def skip_waypoints(path: FloatArray, is_free: MotionTest) -> FloatArray:
@@ -59,6 +66,27 @@ def skip_waypoints(path: FloatArray, is_free: MotionTest) -> FloatArray:
     return np.array(kept)
 
 
+def end_at_nearer_goal(
+    path: FloatArray, goals: FloatArray, is_free: MotionTest
+) -> FloatArray:
+    """Leave the path at a way-point, straight to a goal, where that is shorter.
+
+    A planner stops at the first goal that it meets. With all goals at hand paths are
+    shorter and differ less from attempt to attempt.
+    """
+    before = np.concatenate([[0.0], np.cumsum(_steps_rad(path))])
+    best, best_rad = path, float(before[-1])
+    for k in range(len(path) - 1):
+        total = before[k] + np.linalg.norm(goals - path[k], axis=1)
+        for row in np.argsort(total, kind="stable"):
+            if total[row] > best_rad - _LEAST_GAIN_RAD:
+                break
+            if is_free(path[k], goals[row]):
+                best, best_rad = np.vstack([path[: k + 1], goals[row]]), total[row]
+                break
+    return best
+
+
 def cut_corners(
     path: FloatArray, is_free: MotionTest, *, tries: int, rng: np.random.Generator
 ) -> FloatArray:
@@ -66,9 +94,7 @@ def cut_corners(
     for cut in rng.random((tries, 2)):
         if len(path) < 3:
             break
-        arc = np.concatenate(
-            [[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))]
-        )
+        arc = np.concatenate([[0.0], np.cumsum(_steps_rad(path))])
         begin, end = np.sort(cut) * arc[-1]
         first, last = (
             np.searchsorted(arc, (begin, end), side="right").clip(1, len(path) - 1) - 1
@@ -81,6 +107,10 @@ def cut_corners(
         if gain > _LEAST_GAIN_RAD and is_free(q_from, q_to):
             path = np.vstack([path[: first + 1], q_from, q_to, path[last + 1 :]])
     return path
+
+
+def _steps_rad(path: FloatArray) -> FloatArray:
+    return np.asarray(np.linalg.norm(np.diff(path, axis=0), axis=1))
 
 
 def _point_at(
