@@ -19,8 +19,8 @@ from reachmap.cli.rank import FORMATS
     "--random",
     type=click.IntRange(min=1),
     metavar="N",
-    help="Draw N grasps uniformly from the mapped volume and its approach directions, "
-    "as one more list.",
+    help="Draw N grasps uniformly between the test points and their approach "
+    "directions, as one more list.",
 )
 @click.option(
     "--repeats",

@@ -68,12 +68,13 @@ def test_lists_keep_their_own_numbers():
 
 
 def test_random_grasps_fill_the_mapped_volume():
-    """Uniform inside the bin, between layers and tilts; the same for the same seed."""
+    """Uniform between test points, layers and tilts; the same for the same seed."""
     bin_map = make_bin_map(shape=(3, 5, 7))
     grasps = random_grasps(bin_map, 4000, seed=3)
     assert grasps.frame == "bin"
     low, high = grasps.points.min(axis=0), grasps.points.max(axis=0)
-    wanted_low, wanted_high = [-0.18, -0.13, 0.03], [0.18, 0.13, 0.15]
+    half_x, half_y = 0.18 - 0.36 / 14, 0.13 - 0.26 / 10
+    wanted_low, wanted_high = [-half_x, -half_y, 0.03], [half_x, half_y, 0.15]
     np.testing.assert_allclose(low, wanted_low, atol=1e-3)
     np.testing.assert_allclose(high, wanted_high, atol=1e-3)
     np.testing.assert_allclose(grasps.points.mean(axis=0), [0, 0, 0.09], atol=4e-3)

@@ -18,10 +18,11 @@ MAX_RANDOM = 100_000
 def random_grasps(bin_map: BinMap, count: int, seed: int) -> GraspList:
     """Directions into the bin, uniform over the mapped volume and approach cone.
 
-    Points fill the inside of the bin sideways, and in height what the layers stand
-    for: half a step below the lowest to half a step above the highest; with a single
-    layer, half the grid's larger pitch either way. Directions are uniform over the
-    sphere between the least and the greatest tilt of the map's orientations.
+    Points lie between the outermost test points sideways: nearer to a wall the map
+    extrapolates. In height they fill what the layers stand for: half a step below the
+    lowest to half a step above the highest; with a single layer, half the grid's
+    larger pitch either way. Directions are uniform over the sphere between the least
+    and the greatest tilt of the map's orientations.
 
     Parameters
     ----------
@@ -42,7 +43,7 @@ def random_grasps(bin_map: BinMap, count: int, seed: int) -> GraspList:
         raise SettingsError(f"random must be 1 to {MAX_RANDOM} (got {count})")
     table = table_from_bin_map(bin_map)
     rng = np.random.default_rng(seed)
-    low, high = _volume(bin_map, table)
+    low, high = _volume(table)
     points = rng.uniform(low, high, (count, 3))
     directions = _directions(table, rng.random((count, 2)))
     grasps = [
@@ -60,14 +61,14 @@ def random_grasps(bin_map: BinMap, count: int, seed: int) -> GraspList:
     return grasps_from_document(document, source=f"random {count}")
 
 
-def _volume(bin_map: BinMap, table: GraspTable) -> tuple[FloatArray, FloatArray]:
+def _volume(table: GraspTable) -> tuple[FloatArray, FloatArray]:
     """Corners of the mapped volume in the bin frame [m]."""
-    half_x, half_y = bin_map.bin_inner[:2] / 2.0
+    low, high = table.bin_points.min(axis=0), table.bin_points.max(axis=0)
     layers = table.layers
     step = float(np.diff(layers).max()) if len(layers) > 1 else float(table.pitch.max())
-    bottom = max(float(layers[0]) - step / 2, 0.0)
-    top = float(layers[-1]) + step / 2
-    return np.array([-half_x, -half_y, bottom]), np.array([half_x, half_y, top])
+    low[2] = max(float(layers[0]) - step / 2, 0.0)
+    high[2] = float(layers[-1]) + step / 2
+    return low, high
 
 
 def _directions(table: GraspTable, shares: FloatArray) -> FloatArray:
