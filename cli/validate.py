@@ -9,7 +9,7 @@ from typing import Literal
 import click
 
 from reachmap.cli import options
-from reachmap.cli.rank import FORMATS
+from reachmap.cli.ranking_options import list_options
 
 
 @click.command("validate")
@@ -43,45 +43,7 @@ from reachmap.cli.rank import FORMATS
     metavar="N",
     help="How many of the first grasps of each order are compared.",
 )
-@click.option(
-    "--weights",
-    nargs=3,
-    type=float,
-    default=(1.0, 1.0, 1.0),
-    show_default=True,
-    metavar="α β δ",
-    help="Weights of path length, planning time and execution time.",
-)
-@click.option(
-    "--likeness",
-    type=float,
-    default=0.0,
-    show_default=True,
-    metavar="ε",
-    help="Weight of the distance between grasp and test grasp in the prediction.",
-)
-@click.option(
-    "--neighbours",
-    type=click.IntRange(1, 64),
-    default=1,
-    show_default=True,
-    help="Blend the costs of so many test points in the prediction.",
-)
-@click.option(
-    "--roll",
-    type=click.Choice(["as-given", "free", "fixed"]),
-    default="as-given",
-    show_default=True,
-    help="Whether the roll about the approach counts. As given: it is free for grasps "
-    "with a direction and fixed for those with an orientation.",
-)
-@click.option(
-    "--from",
-    "format_name",
-    type=click.Choice(FORMATS),
-    help="Format of the lists; by default their content tells.",
-)
-@click.option("--frame", metavar="NAME", help="Frame of imported lists.")
+@list_options
 @click.option(
     "--chart",
     type=options.OUTPUT_PATH,
