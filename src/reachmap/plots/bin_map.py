@@ -73,7 +73,6 @@ def draw_reachability(
             colours=colour_map(percent_map),
             scale=PERCENT_SCALE,
             font_size=number_size(bin_map.x, bin_map.y, scale_in),
-            halo=False,
         )
         frame_bin(axes, view)
         axis_titles(axes, "the bin")
@@ -150,7 +149,6 @@ def draw_costs(
             scale=_range(panel.values),
             text=panel.text,
             font_size=number_size(bin_map.x, bin_map.y, scale_in, 4),
-            halo=False,
         )
         frame_bin(axes, view)
         axis_titles(axes, "the bin")

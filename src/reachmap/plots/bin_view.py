@@ -102,7 +102,8 @@ def _point_to_robot(axes: Axes, view: BinView) -> None:
     towards = robot / distance
     # From the wall outwards, where the ray to the robot leaves the bin.
     with np.errstate(divide="ignore"):
-        exit_at = float(np.min(half / np.abs(towards)))
+        exits = half / np.abs(towards)
+    exit_at = float(exits.min())
     room = view.margin - view.wall
     start, end = (towards * (exit_at + part * room) for part in (0.12, 0.92))
     axes.add_patch(
@@ -118,19 +119,16 @@ def _point_to_robot(axes: Axes, view: BinView) -> None:
             zorder=5,
         )
     )
-    sideways = np.array([-towards[1], towards[0]])
-    if abs(towards[0]) > abs(towards[1]):
-        rotation, side = 90.0, sideways * np.sign(sideways[1])
-    else:
-        rotation, side = 0.0, sideways * np.sign(sideways[0])
-    place = (start + end) / 2.0 + 0.45 * room * side
-    axes.text(
-        float(place[0]),
-        float(place[1]),
+    # Beside the arrow, along the wall that the ray leaves through.
+    upright = bool(exits[0] <= exits[1])
+    axes.annotate(
         "robot",
+        tuple((start + end) / 2.0),
+        xytext=(0, 9) if upright else (9, 0),
+        textcoords="offset points",
         fontsize=8,
-        rotation=rotation,
-        ha="left" if rotation == 0.0 else "center",
-        va="center" if rotation == 0.0 else "bottom",
+        rotation=90.0 if upright else 0.0,
+        ha="center" if upright else "left",
+        va="bottom" if upright else "center",
         color=INK,
     )

@@ -42,7 +42,8 @@ def draw_causes(record: WorkspaceMap | BinMap) -> Figure:
         [100.0 * count / total for count in causes.states.values()],
         [STATUS_COLOURS[code] for code in causes.states],
     )
-    first.set_title("test frames [%]", loc="left", pad=5)
+    kind = "test grasps" if isinstance(record, BinMap) else "test frames"
+    first.set_title(f"{kind} [%]", loc="left", pad=5)
     second = axes_at(figure, LEFT, 0.55, WIDTH, lower)
     _draw_bars(
         second,
@@ -50,12 +51,12 @@ def draw_causes(record: WorkspaceMap | BinMap) -> Figure:
         [100.0 * count / total for _, count in shown] or [0.0],
         [STATUS_COLOURS[Status.IK_IN_COLLISION]] * max(len(shown), 1),
     )
-    second.set_title("bodies in collision [% of the test frames]", loc="left", pad=5)
+    second.set_title(f"bodies in collision [% of the {kind}]", loc="left", pad=5)
     reached = 100.0 * causes.states.get(Status.PATH_FOUND, 0) / total
     more = len(causes.pairs) - len(shown)
     name = context_of(record.provenance).name
     said = (
-        f"{causes.total} test frames attempted",
+        f"{causes.total} {kind} attempted",
         f"{more} more pairs of bodies" if more > 0 else "",
         name,
     )

@@ -14,6 +14,7 @@ from matplotlib.patches import Rectangle
 
 from reachmap._typing import BoolArray, FloatArray
 from reachmap.plots.levels import level_means, level_names
+from reachmap.plots.numbers import closed_path
 from reachmap.plots.outlines import Outline, draw_outline, legend_lines
 from reachmap.plots.overview import sheet_columns
 from reachmap.plots.squares import (
@@ -31,6 +32,7 @@ from reachmap.plots.style import (
     CHANGE_MAP,
     INK,
     MUTED,
+    PALE,
     RULE,
     PercentMap,
     axes_at,
@@ -93,9 +95,20 @@ class MapChange:
         return Normalize(-limit, limit)
 
     def shown(self, level: int) -> tuple[Outline, ...]:
-        """Outlines to draw on a level: the robot base and what crosses or is near."""
+        """Outlines to draw on a level: the robot base and what crosses or is near.
+
+        What lies beside the squares altogether is left out.
+        """
         z = float(self.z[level])
-        return tuple(o for o in self.outlines if o.kind == "base" or o.near(z, 0.05))
+        near = (o for o in self.outlines if o.kind == "base" or o.near(z, 0.05))
+        x, y = cell_edges(self.x), cell_edges(self.y)
+        low, high = np.array([x[0], y[0]]), np.array([x[-1], y[-1]])
+        return tuple(
+            o
+            for o in near
+            if (o.polygon.max(axis=0) > low).all()
+            and (o.polygon.min(axis=0) < high).all()
+        )
 
     def most_changed(self) -> int:
         """Level with the largest mean change, either way."""
@@ -136,6 +149,8 @@ def draw_comparison(
             scale=PERCENT_SCALE,
             text=percent_text,
             font_size=number_size(maps.x, maps.y, scale_in),
+            scale_in=scale_in,
+            lines=[closed_path(outline.polygon) for outline in maps.shown(level)],
         )
         axes.set_title(f"{name} · {_mean_text(value)}", loc="left", pad=6)
     changed = _draw_change(panels[2], maps, level, scale_in)
@@ -172,7 +187,10 @@ def _draw_change(
         scale=maps.scale(),
         text=signed_text,
         font_size=number_size(maps.x, maps.y, scale_in, 4),
+        separator=PALE,
         halo=False,
+        scale_in=scale_in,
+        lines=[closed_path(outline.polygon) for outline in maps.shown(level)],
     )
     x, y = cell_edges(maps.x), cell_edges(maps.y)
     inset = 0.04 * min(float(np.diff(x).min()), float(np.diff(y).min()))

@@ -19,6 +19,7 @@ from reachmap.plots.levels import (
     best_patch,
     best_square,
 )
+from reachmap.plots.numbers import closed_path
 from reachmap.plots.outlines import draw_outline, legend_lines
 from reachmap.plots.squares import (
     PERCENT_SCALE,
@@ -31,6 +32,7 @@ from reachmap.plots.squares import (
 from reachmap.plots.stack import LevelStack, level_subtitle, level_title
 from reachmap.plots.style import (
     NOT_ATTEMPTED,
+    PALE,
     PercentMap,
     axes_at,
     drawing,
@@ -101,6 +103,9 @@ def draw_level_on(
         scale=PERCENT_SCALE,
         font_size=number_size(stack.x, stack.y, scale_in),
         halo=not small,
+        scale_in=scale_in,
+        lines=[closed_path(outline.polygon) for outline in stack.shown(level)],
+        separator=PALE if stack.quantity == "difference" else "white",
     )
     low, high = stack.view()
     axes.set_xlim(low[0], high[0])

@@ -10,6 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
+from matplotlib.patheffects import withStroke
 
 from reachmap._typing import FloatArray
 from reachmap.errors import SettingsError
@@ -84,7 +85,7 @@ def ranking_chart(
             ):
                 _draw_bar(axes, place + shift, terms[:top], limit)
         _finish(axes, groups, top, limit)
-        _legend(figure, groups)
+        _legend(figure, groups, top)
     return figure
 
 
@@ -124,6 +125,9 @@ def _draw_bar(axes: Axes, x: float, terms: FloatArray, limit: float) -> None:
         axes.text(
             x, bottom + 0.012 * limit, f"{bottom:.2f}", ha="center", va="bottom",
             fontsize=7.6, color=INK, zorder=3,
+            path_effects=[withStroke(linewidth=2.0, foreground="white")]
+            if not unreachable
+            else [],
         )  # fmt: skip
 
 
@@ -147,14 +151,16 @@ def _finish(axes: Axes, groups: Sequence[CostGroup], top: int, limit: float) -> 
     axes.set_axisbelow(True)
 
 
-def _legend(figure: Figure, groups: Sequence[CostGroup]) -> None:
+def _legend(figure: Figure, groups: Sequence[CostGroup], top: int) -> None:
     count = groups[0].supplied.shape[1]
     left = 0.75 / float(figure.get_size_inches()[0])
     named = zip(TERM_COLOURS[:count], TERM_LABELS[:count], strict=True)
     handles = [Patch(color=colour, label=label) for colour, label in named]
-    handles.append(
-        Patch(color=NOT_ATTEMPTED, label="unreachable grasps: the mean is infinite")
-    )
+    orders = [terms[:top] for g in groups for terms in (g.supplied, g.ranked)]
+    if any(np.isnan(terms).any() for terms in orders):
+        handles.append(
+            Patch(color=NOT_ATTEMPTED, label="unreachable grasps: the mean is infinite")
+        )
     figure.legend(
         handles=handles, loc="lower left", ncols=len(handles), labelcolor=MUTED,
         bbox_to_anchor=(left, 0.01), borderaxespad=0.0, columnspacing=1.2,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -19,6 +20,9 @@ from reachmap.plots.style import (
     new_figure,
     put_title,
 )
+
+# Points with their number written beside them; more would run into each other.
+MOST_NAMED = 8
 
 
 @drawing()
@@ -57,11 +61,13 @@ def _draw_curve(axes: Axes, data: Saturation) -> None:
         capsize=4,
         elinewidth=1.2,
     )
-    for k, value, bottom in zip(data.attempts, data.share, data.low, strict=True):
+    # The curve never falls, so there is room to the lower right of every point.
+    named = np.arange(len(data.attempts))[:: -(-len(data.attempts) // MOST_NAMED)]
+    for k, value in zip(data.attempts[named], data.share[named], strict=True):
         axes.annotate(
             f"{value:.2f}",
-            (k, bottom),
-            xytext=(3, -5),
+            (k, value),
+            xytext=(6, -4),
             textcoords="offset points",
             ha="left",
             va="top",

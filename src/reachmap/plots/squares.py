@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -11,10 +11,12 @@ from matplotlib.collections import QuadMesh
 from matplotlib.colorbar import Colorbar
 from matplotlib.colors import Colormap, Normalize
 from matplotlib.figure import Figure
+from matplotlib.path import Path
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MultipleLocator
 
 from reachmap._typing import FloatArray
+from reachmap.plots.numbers import DIGIT_WIDTH, POINTS_PER_INCH, number_place
 from reachmap.plots.style import (
     LARGEST_NUMBER,
     RULE,
@@ -26,9 +28,8 @@ from reachmap.plots.style import (
 MINUS = "\N{MINUS SIGN}"
 MISSING = "\N{EN DASH}"
 PERCENT_SCALE = Normalize(0.0, 100.0)
-# Width of a digit and height of a line, in units of the font size (DejaVu Sans).
-DIGIT_WIDTH, LINE_HEIGHT = 0.64, 1.2
-POINTS_PER_INCH = 72.0
+# Height of a line of text in units of the font size.
+LINE_HEIGHT = 1.2
 
 
 def percent_text(value: float) -> str:
@@ -78,7 +79,7 @@ def number_size(
         float(np.diff(cell_edges(c)).min()) * scale_in * POINTS_PER_INCH for c in (x, y)
     )
     size = min(
-        0.86 * width / (DIGIT_WIDTH * characters),
+        0.82 * width / (DIGIT_WIDTH * characters),
         0.80 * height / LINE_HEIGHT,
         LARGEST_NUMBER,
     )
@@ -95,7 +96,10 @@ def draw_squares(
     scale: Normalize,
     text: Callable[[float], str] = percent_text,
     font_size: float = 8.0,
+    separator: str = "white",
     halo: bool = True,
+    scale_in: float = 0.0,
+    lines: Sequence[Path] = (),
 ) -> QuadMesh:
     """Draw values as coloured squares, seen from above, y upwards.
 
@@ -112,8 +116,14 @@ def draw_squares(
         Number to what is written in the square.
     font_size : float
         Of the numbers [pt]; 0 leaves them out.
+    separator : str
+        Colour of the lines between the squares.
     halo : bool
-        Whether outlines that cross a number are interrupted round it.
+        Whether lines that cross a number are interrupted round it.
+    scale_in : float
+        Inches per metre of the picture; needed with ``lines``.
+    lines : sequence of Path
+        Outlines that will be drawn over the squares; the numbers keep clear of them.
     """
     x_edges, y_edges = cell_edges(x), cell_edges(y)
     mesh = axes.pcolormesh(
@@ -122,7 +132,7 @@ def draw_squares(
         np.ma.masked_invalid(values),
         cmap=colours,
         norm=scale,
-        edgecolors="white",
+        edgecolors=separator,
         linewidth=0.5,
         zorder=1,
     )
@@ -131,12 +141,22 @@ def draw_squares(
     axes.set_aspect("equal")
     axes.tick_params(length=2.5)
     if font_size:
+        rgbs = np.asarray(colours(np.ma.masked_invalid(scale(values))))
         for (row, column), value in np.ndenumerate(values):
-            centre = (float(x[column]), float(y[row]))
-            rgb = np.asarray(colours(np.ma.masked_invalid(scale([value])))[0])
+            rgb = rgbs[row, column]
+            words = text(float(value))
+            place = (float(x[column]), float(y[row]))
+            if lines:
+                place = number_place(
+                    np.array([x_edges[column : column + 2], y_edges[row : row + 2]]).T,
+                    len(words),
+                    font_size=font_size,
+                    scale_in=scale_in,
+                    lines=lines,
+                )
             axes.text(
-                *centre,
-                text(float(value)),
+                *place,
+                words,
                 ha="center",
                 va="center_baseline",
                 fontsize=font_size,

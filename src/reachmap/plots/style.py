@@ -31,6 +31,8 @@ CHANGE_MAP = "PRGn"
 COST_MAP = "YlGnBu"
 NOT_ATTEMPTED = "#d3d3d3"
 INK, MUTED, RULE = "#1c1c1c", "#5f5f5f", "#9a9a9a"
+# Lines between squares that may be white themselves.
+PALE = "#dcdcdc"
 BIN_COLOUR = "#10389c"
 
 TITLE_SIZE, SUBTITLE_SIZE, LABEL_SIZE, TICK_SIZE = 12.5, 9.5, 9.5, 8.5

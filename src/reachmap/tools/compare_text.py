@@ -13,6 +13,8 @@ from reachmap.tools.text_table import fact_lines, plural, table_lines
 SQUARES_SHOWN = 10
 CAUSES_SHOWN = 8
 CHANGES_SHOWN = 12
+# Above this a difference is called chance.
+SIGNIFICANT = 0.05
 
 
 def compare_text(comparison: MapComparison) -> str:
@@ -20,6 +22,7 @@ def compare_text(comparison: MapComparison) -> str:
     r = comparison.result
     lines = [
         f"{comparison.names[0]} against {comparison.names[1]}: {comparison.headline}",
+        verdict(comparison.names, r),
         *fact_lines(_count_facts(r)),
         *_cause_lines("Why frames were lost", r.losses),
         *_cause_lines("What kept the frames that were gained", r.gains),
@@ -27,6 +30,18 @@ def compare_text(comparison: MapComparison) -> str:
         *_cell_lines(r.cell_changes),
     ]
     return "\n".join(lines)
+
+
+def verdict(names: tuple[str, str], r: Comparison) -> str:
+    """Answer the question in a sentence: which map reaches more, and is it chance."""
+    before, after = names
+    counts = f"{plural(r.gained, 'test frame')} gained, {r.lost} lost"
+    if not r.gained and not r.lost:
+        return f"{after} reaches the same test frames as {before}."
+    if r.p_value >= SIGNIFICANT:
+        return f"No difference beyond chance: {counts}."
+    word = "more" if r.gained > r.lost else "less"
+    return f"{after} reaches {word} than {before}, beyond chance: {counts}."
 
 
 def _count_facts(r: Comparison) -> list[tuple[str, str]]:
