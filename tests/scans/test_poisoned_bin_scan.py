@@ -24,7 +24,7 @@ def test_everything_but_the_poisoned_unit_is_there(tmp_path, monkeypatch):
     run = RunOptions(workers=2)
     with monkeypatch.context() as poison:
         poison.setattr(tool, "bin_work", poisoned_bin.bin_work)
-        with pytest.raises(IncompleteError, match="b.h5") as failure:
+        with pytest.raises(IncompleteError, match=r"b\.h5") as failure:
             tool.bin_scan(None, path, cell=cell, overrides=FEW, run=run)
     assert failure.value.exit_code == 3
     part = read_bin_map(path)
