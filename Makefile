@@ -9,8 +9,9 @@ CELL   ?= ur5-eye-in-hand
 GRASPS ?= examples/pile-1.json
 RUN    ?= run
 WORKERS ?= $(JOBS)
-# Sizes of a quick look; `make SIZE=` or `make paper` uses the cell's own.
-SIZE   ?= --set bin_scan.repeats=2 --set 'bin_scan.grid=[10,7]'
+# Empty for the cell's own sizes, which are the paper's.
+SIZE   ?=
+QUICK  := --set bin_scan.repeats=2 --set 'bin_scan.grid=[10,7]'
 
 BIN      := $(VENV)/bin
 PIP      := $(BIN)/python -m pip --disable-pip-version-check -qq
@@ -20,7 +21,7 @@ RESULTS  := $(RUN)/.pictures $(RUN)/ranked.json $(RUN)/report.html
 
 .DEFAULT_GOAL := run
 .DELETE_ON_ERROR:
-.PHONY: help run paper install dev test test-slow lint check docs bench wheel view \
+.PHONY: help run paper quick install dev test test-slow lint check docs bench wheel view \
         clean clean-run
 
 help: ## Show this list
@@ -29,8 +30,10 @@ help: ## Show this list
 run: $(RESULTS) ## Install, then scan, place, scan and rank on the shipped cell (default)
 	@echo "Done. Open $(RUN)/report.html, $(RUN)/pictures and $(RUN)/ranked.json."
 
-paper: ## The same at the full sizes of the paper, into run/paper
-	@$(MAKE) --no-print-directory run RUN=run/paper SIZE=
+paper: run ## The experiment of the paper at its full sizes, which is the default
+
+quick: ## The same with fewer test grasps and attempts, into run/quick
+	@$(MAKE) --no-print-directory run RUN=run/quick SIZE="$(QUICK)"
 
 install: $(VENV)/.runtime ## Create the virtual environment and install reachmap
 dev: $(VENV)/.dev ## Add what tests, checks and documentation need
