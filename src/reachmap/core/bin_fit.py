@@ -58,34 +58,42 @@ class BinFit:
     """Checks poses of the bin against bodies that stand still and against the arm.
 
     A body may touch the bin from outside, as a table does that carries it, but not
-    reach into it or its inner volume. The arm keeps the cell's safety margin, as in
-    every plan.
+    reach into it. The arm keeps the cell's safety margin, as in every plan.
 
     Parameters
     ----------
     robot : RobotModel
     loaded : LoadedCell
         Its own bin pose is not used.
-    q : array, shape (dof,)
-        Scan configuration [rad].
+    q : array, shape (dof,), or None
+        Scan configuration [rad]; None where it is not known yet, and the arm is left
+        out.
+    empty : bool
+        Whether what stands still may not be inside the bin either; a divider may,
+        as long as it does not reach into walls or bottom.
     """
 
-    def __init__(self, robot: RobotModel, loaded: LoadedCell, q: FloatArray) -> None:
-        bodies = bodies_at(robot, build_geometry(robot, loaded, with_bin=False), q)
+    def __init__(
+        self,
+        robot: RobotModel,
+        loaded: LoadedCell,
+        q: FloatArray | None,
+        *,
+        empty: bool = True,
+    ) -> None:
+        geometry = build_geometry(robot, loaded, with_bin=False)
+        bodies = bodies_at(robot, geometry, np.zeros(robot.dof) if q is None else q)
         boxes = bin_boxes(loaded.cell.bin)
         # A little smaller, so that standing on a table is no collision.
-        still_parts = [*_parts(boxes, CONTACT_M), _part(_solid(boxes), CONTACT_M)]
-        margin_m = loaded.cell.collision.safety_margin_m
-        self._groups = (
-            _Group(
-                PlacedBodies(b for b in bodies if b.joint == ROOT), still_parts, loaded
-            ),
-            _Group(
-                PlacedBodies((b for b in bodies if b.joint != ROOT), margin_m),
-                _parts(boxes, 0.0),
-                loaded,
-            ),
-        )
+        still_parts = _parts(boxes, CONTACT_M)
+        if empty:
+            still_parts.append(_part(_solid(boxes), CONTACT_M))
+        still = PlacedBodies(b for b in bodies if b.joint == ROOT)
+        self._groups = [_Group(still, still_parts, loaded)]
+        if q is not None:
+            margin_m = loaded.cell.collision.safety_margin_m
+            arm = PlacedBodies((b for b in bodies if b.joint != ROOT), margin_m)
+            self._groups.append(_Group(arm, _parts(boxes, 0.0), loaded))
 
     def contact(self, T_base_bin: FloatArray) -> BinContact | None:
         """First thing that the bin meets at a pose (4, 4), or None."""

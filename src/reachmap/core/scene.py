@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from reachmap._typing import FloatArray
+from reachmap.core.bin_fit import BinFit
 from reachmap.core.bodies import build_geometry
 from reachmap.core.collision import CollisionChecker
 from reachmap.core.kinematics import Kinematics
@@ -87,7 +88,8 @@ class Scene:
         Raises
         ------
         SceneError
-            It is outside joint limits, or two bodies touch; they are named.
+            It is outside joint limits, or two bodies touch, or the bin reaches into
+            what stands around it; they are named.
         """
         problems = self.scan_problems()
         if problems:
@@ -112,6 +114,12 @@ class Scene:
         for index in self.checker.touching_pairs(q):
             first, second = self.checker.body_pairs[index].split(" | ")
             problems.append(f"scan_configuration: {first} touches {second}")
+        # Bodies that stand still are no collision pairs; here they are looked at.
+        if self.with_bin:
+            fit = BinFit(robot, self.loaded, None, empty=False)
+            contact = fit.contact(self.T_base_bin)
+            if contact is not None:
+                problems.append(f"bin.pose: {contact.pair}")
         return tuple(problems)
 
     def tcp_path_points(self, path: FloatArray, step_rad: float = 0.02) -> FloatArray:

@@ -9,11 +9,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from reachmap._typing import FloatArray
 from reachmap.core.bin_fit import BinFit, ToolFit
 from reachmap.core.scene import Scene
 from reachmap.errors import SceneError
 from reachmap.geometry import transform_from_parts, yaw_transform
 from reachmap.maps.records import WorkspaceMap
+from reachmap.placement import margins, refine
 from reachmap.placement.candidates import Candidate, CandidateTable
 from reachmap.placement.evaluator import Evaluator
 from reachmap.placement.exact import ALWAYS, Pose
@@ -28,14 +30,17 @@ from reachmap.placement.places import (
     spread_out,
 )
 from reachmap.placement.prediction import predict
-from reachmap.placement.refine import MIN_GAIN_POINTS, refine
 from reachmap.placement.region import Region
+from reachmap.placement.scan_choice import FINALISTS
 
 if TYPE_CHECKING:
     from reachmap.cell.loading import LoadedCell
 
 TURNS_DEG = (45.0, 90.0, 135.0)
 PLACES_IMPROVED = 2
+# Poses to look at, at most: while turning, and once the pose is decided.
+MOST_TURNS = PLACES_IMPROVED * len(TURNS_DEG)
+SETTLING = FINALISTS + margins.MOST_POSES
 NO_ROW = -1
 
 
@@ -50,7 +55,10 @@ class Question:
     region : Region
     scene : Scene
         Without the bin.
+    keep_scan : bool
+        Whether the cell's own scan configuration stays.
     fit : BinFit
+        With the arm at the scan configuration if that stays, else without the arm.
     evaluator : Evaluator
     """
 
@@ -58,6 +66,7 @@ class Question:
     workspace: WorkspaceMap
     region: Region
     scene: Scene
+    keep_scan: bool
     fit: BinFit
     evaluator: Evaluator
 
@@ -74,24 +83,26 @@ class Question:
         contact = self.fit.contact(yaw_transform(*pose))
         return "" if contact is None else contact.reason
 
-    def is_possible(self, pose: Pose) -> bool:
-        """Whether the bin would stand free at a pose, in the region or not."""
-        return self.fit.contact(yaw_transform(*pose)) is None
+    @property
+    def start(self) -> FloatArray | None:
+        """Scan configuration that poses are mapped from, None if it is chosen later."""
+        return self.scene.scan_configuration if self.keep_scan else None
 
-    def exact(self, poses: Sequence[Pose], *, above: float = ALWAYS) -> list[Candidate]:
-        """Map poses from the cell's own scan configuration.
+    def exact(
+        self, poses: Sequence[Pose], *, above: float | Sequence[float] = ALWAYS
+    ) -> list[Candidate]:
+        """Map poses with the bin in the scene.
 
-        Poses whose bound is not above a score are left out; what is blocked comes
-        with its reason.
+        Poses whose bound is not above a score are left out; those without a scan
+        configuration come with the reason.
         """
-        q = self.scene.scan_configuration
-        found = self.evaluator.evaluate(poses, q, above=above)
+        found = self.evaluator.evaluate(poses, self.start, above=above)
         return [
-            Candidate(pose=pose, score=e.score, exact=True)
-            if e.score is not None
-            else Candidate(pose=pose, reason=f"{e.blocked} at the scan configuration")
+            Candidate(
+                pose=pose, score=e.score, exact=e.score is not None, reason=e.reason
+            )
             for pose, e in zip(poses, found, strict=True)
-            if e.score is not None or e.blocked
+            if e.score is not None or e.reason
         ]
 
 
@@ -142,6 +153,7 @@ def decide_by_search(question: Question, top: int) -> Decision:
     finalists = spread_out(places, top, question.different_place_m)
     paper = paper_pose(question)
     poses = [c.pose for c in finalists] + ([] if paper is None else [paper])
+    question.evaluator.expect(len(poses) + MOST_TURNS + refine.MOST_POSES + SETTLING)
     mapped = question.exact(poses)
     scored = sorted((c for c in mapped if c.score is not None), key=rank_key)
     better = _improved(question, scored[:PLACES_IMPROVED])
@@ -170,8 +182,11 @@ def decide_by_paper(question: Question) -> Decision:
     pose = paper_pose(question)
     if pose is None:
         raise SceneError(_nowhere(question, decision.table))
+    question.evaluator.expect(1 + SETTLING)
     decision.paper = decision.table.add(question.exact([pose])[0])
     decision.rank()
+    if not decision.ranked:
+        raise SceneError(_nowhere(question, decision.table))
     return decision
 
 
@@ -189,10 +204,14 @@ def decide_as_given(question: Question, pose: Pose) -> Decision:
     decision = Decision()
     paper = paper_pose(question)
     poses = [pose] if paper is None or paper == pose else [pose, paper]
+    question.evaluator.expect(len(poses) + SETTLING)
     for candidate in question.exact(poses):
         row = decision.table.add(candidate)
         if candidate.pose == paper:
             decision.paper = row
+    given = decision.table.rows[0]
+    if given.score is None:
+        raise SceneError(f"--bin-pose: {given.reason}")
     decision.ranked = [0]
     return decision
 
@@ -246,26 +265,41 @@ def _improved(question: Question, starts: list[Candidate]) -> list[Pose]:
 
     A pose counts as better by a quarter of a point.
     """
-    best: list[Candidate] = []
-    for start in starts:
-        assert start.score is not None
-        turned = [_with_turn(start.pose, turn, question) for turn in TURNS_DEG]
-        found = question.exact(
-            [pose for pose in turned if not question.reason_against(pose)],
-            above=start.score.score + MIN_GAIN_POINTS,
-        )
-        scored = [c for c in found if c.score is not None]
-        best.append(min([start, *scored], key=rank_key))
-    if not best:
+    if not starts:
         return []
-    moved = refine(
+    evaluator = question.evaluator
+    evaluator.expect(MOST_TURNS + refine.MOST_POSES + SETTLING)
+    best = _turned(question, starts)
+    evaluator.expect(refine.MOST_POSES + SETTLING)
+    moved = refine.refine(
         min(best, key=rank_key),
-        question.scene.scan_configuration,
+        question.start,
         question.region,
         question.reason_against,
-        question.evaluator,
+        evaluator,
     )
     return list(dict.fromkeys([moved.pose, *(c.pose for c in best)]))
+
+
+def _turned(question: Question, starts: list[Candidate]) -> list[Candidate]:
+    """Each of some candidates, or a better one at the same place."""
+    turns = {
+        pose: start
+        for start in starts
+        for pose in (_with_turn(start.pose, turn, question) for turn in TURNS_DEG)
+        if not question.reason_against(pose)
+    }
+    above = [
+        start.score.score + refine.MIN_GAIN_POINTS
+        for start in turns.values()
+        if start.score is not None
+    ]
+    found = question.exact(list(turns), above=above)
+    better = [c for c in found if c.score is not None]
+    return [
+        min([start, *(c for c in better if turns[c.pose] is start)], key=rank_key)
+        for start in starts
+    ]
 
 
 def _with_turn(pose: Pose, turn_deg: float, question: Question) -> Pose:

@@ -17,6 +17,7 @@ from reachmap._typing import FloatArray
 from reachmap.errors import EngineError
 from reachmap.placement.exact import ALWAYS, NEVER, PlacedScene, Pose, PoseScore
 from reachmap.placement.footprint import COARSE, Grid
+from reachmap.placement.imaging import UNSEEN, imaging_configurations
 from reachmap.scans.crew import Crew
 from reachmap.scans.encoding import json_from_value, value_from_json
 from reachmap.scans.executors import open_lanes
@@ -29,7 +30,6 @@ if TYPE_CHECKING:
     from reachmap.cell.loading import LoadedCell
 
 SCENES_KEPT = 2
-USUAL_POSES = 90
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,15 +41,14 @@ class Evaluation:
     bound : float
         No score can be higher [percent].
     score : PoseScore or None
-        None if the bound is not above what was asked for, or the scan configuration
-        is blocked.
-    blocked : str
-        ``"A | B"`` that touch at the scan configuration, or "".
+        None if the bound is not above what was asked for, or for a reason.
+    reason : str
+        Why there is no scan configuration to start from, or "".
     """
 
     bound: float
     score: PoseScore | None
-    blocked: str = ""
+    reason: str = ""
 
 
 class Evaluator:
@@ -71,15 +70,24 @@ class Evaluator:
     def __init__(self, crew: Crew, progress: Progress) -> None:
         self._crew, self._progress = crew, progress
         self._known: dict[tuple[float, ...], Evaluation] = {}
+        self._expects = False
         self.cpu_s = 0.0
         self.mapped = 0
+
+    def expect(self, poses: int) -> None:
+        """Say how many more poses will be looked at, at most."""
+        if self._expects:
+            self._progress.expect(self.mapped + poses)
+        else:
+            self._progress.begin(poses)
+            self._expects = True
 
     def evaluate(
         self,
         poses: Sequence[Pose],
-        q: FloatArray,
+        q: FloatArray | None,
         *,
-        above: float = ALWAYS,
+        above: float | Sequence[float] = ALWAYS,
         enough: float = NEVER,
         grid: Grid = COARSE,
     ) -> list[Evaluation]:
@@ -88,22 +96,30 @@ class Evaluator:
         Parameters
         ----------
         poses : sequence of (x, y, z [m], yaw [rad])
-        q : array, shape (dof,) or (poses, dof)
-            Scan configuration of all, or of each [rad].
-        above : float
-            A pose whose bound is not above this need not be scored [percent].
+        q : array, shape (dof,) or (poses, dof), or None
+            Scan configuration of all, or of each [rad]. None where it is chosen
+            later: the cell's own or, where the bin is in its way, one that images
+            the bin.
+        above : float or sequence of float
+            A pose whose bound is not above this need not be scored [percent]; of all,
+            or of each.
         enough : float
             A score from which on no more is looked for [percent].
         grid : (int, int)
             See :func:`reachmap.placement.footprint.sample_of`.
         """
-        starts = np.broadcast_to(q, (len(poses), np.shape(q)[-1]))
+        start = np.zeros(0) if q is None else q
+        starts = np.broadcast_to(start, (len(poses), start.shape[-1]))
         keys = [
             (*grid, enough, *pose, *start.tolist())
             for pose, start in zip(poses, starts, strict=True)
         ]
-        missing = [key for key in dict.fromkeys(keys) if self._is_open(key, above)]
-        units = {unit_of_numbers([*key, above]): key for key in missing}
+        least = np.broadcast_to(above, len(poses)).tolist()
+        units = {
+            unit_of_numbers([*key, least_of_key]): key
+            for key, least_of_key in dict(zip(keys, least, strict=True)).items()
+            if self._is_open(key, least_of_key)
+        }
         with closing(self._crew.replies(units)) as replies:
             for reply in replies:
                 if reply is None:
@@ -123,7 +139,7 @@ class Evaluator:
         known = self._known.get(key)
         if known is None:
             return True
-        return known.score is None and not known.blocked and known.bound > above
+        return known.score is None and not known.reason and known.bound > above
 
 
 @contextmanager
@@ -141,7 +157,6 @@ def open_evaluator(
     )
     parcel = Parcel(key=secrets.token_hex(16), job=job)
     with open_lanes(executor, workers, parcel) as lanes, Crew(lanes) as crew:
-        progress.begin(USUAL_POSES)
         yield Evaluator(crew, progress)
         progress.end()
 
@@ -167,18 +182,39 @@ class Prepared:
 def evaluate_unit(prepared: Prepared, unit: int) -> dict[str, Any]:
     """Score one pose; the unit's number says which, see :func:`unit_of_numbers`."""
     across, along, enough, x, y, z, yaw, *rest = numbers_of_unit(unit)
-    q, above = np.array(rest[:-1]), rest[-1]
     placed = prepared.scene_at((x, y, z, yaw), (int(across), int(along)))
-    checker = placed.scene.checker
-    pair = checker.blocking_pair(q)
-    if pair >= 0:
-        return {"bound": 0.0, "blocked": checker.body_pairs[pair], "score": None}
-    bound, score = placed.score_from(q, above=above, enough=enough)
+    q, reason = start_of(placed, np.array(rest[:-1]) if rest[:-1] else None)
+    if q is None:
+        return {"bound": 0.0, "reason": reason, "score": None}
+    bound, score = placed.score_from(q, above=rest[-1], enough=enough)
     return {
         "bound": bound,
-        "blocked": "",
+        "reason": "",
         "score": None if score is None else dataclasses.asdict(score),
     }
+
+
+def start_of(
+    placed: PlacedScene, q: FloatArray | None
+) -> tuple[FloatArray | None, str]:
+    """Scan configuration to start from, or None and why there is none.
+
+    Parameters
+    ----------
+    placed : PlacedScene
+    q : array, shape (dof,), or None
+        See :meth:`Evaluator.evaluate`.
+    """
+    checker = placed.scene.checker
+    checker.reset()
+    wanted = placed.scene.scan_configuration if q is None else q
+    pair = checker.blocking_pair(wanted)
+    if pair < 0:
+        return wanted, ""
+    if q is not None:
+        return None, f"{checker.body_pairs[pair]} at the scan configuration"
+    image = next(imaging_configurations(placed), None)
+    return image, UNSEEN if image is None else ""
 
 
 def unit_of_numbers(numbers: Sequence[float]) -> int:
@@ -200,5 +236,5 @@ def _evaluation(content: dict[str, Any]) -> Evaluation:
     return Evaluation(
         bound=content["bound"],
         score=None if score is None else PoseScore(**score),
-        blocked=content["blocked"],
+        reason=content["reason"],
     )

@@ -153,7 +153,10 @@ class PlacedScene:
         """One free approach for each frame that has one, unless too few have."""
         self.scene.checker.reset()
         goals = _Goals(tried=self._begin[:-1].copy(), bound=self.bound)
-        for k in np.flatnonzero(np.diff(self._begin)):
+        branches = np.diff(self._begin)
+        # Those with few branches first: too low a bound shows sooner.
+        order = np.argsort(branches, kind="stable")
+        for k in order[np.searchsorted(branches[order], 1) :]:
             while goals.tried[k] < self._begin[k + 1]:
                 if self._try_next(goals, int(k)):
                     break

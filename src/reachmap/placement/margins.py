@@ -15,6 +15,9 @@ from reachmap.placement.region import AXES
 DROP_POINTS = 5.0
 SHIFTS_M = (0.01, 0.02, 0.03, 0.05, 0.07, 0.10, 0.15)
 TURNS_RAD = tuple(np.radians((2.0, 5.0, 8.0, 12.0, 20.0, 30.0, 45.0)).tolist())
+# The pose itself; in each direction the last rung, then a bisection of the others.
+MOST_POSES = 1 + 2 * len(AXES) * (1 + int(np.log2(len(SHIFTS_M))) + 1)
+Direction = tuple[int, float]
 
 
 def margins(
@@ -26,9 +29,9 @@ def margins(
     """How far the bin can be off before the score drops by 5 points.
 
     Each direction has a short ladder of distances, whose last rung is the cap: 0.15 m
-    and 45 degrees. The cap is tried first, then the ladder is bisected: what is found
-    held, and the next rung did not. Scores are those of the thin sample, also the one
-    that they are compared with.
+    and 45 degrees. It is cut off where the bin cannot stand any more. What is left is
+    bisected, its last rung first: what is found held, and the next rung did not.
+    Scores are those of the thin sample, also the one that they are compared with.
 
     Parameters
     ----------
@@ -36,7 +39,7 @@ def margins(
     q : array, shape (dof,)
         Scan configuration, which stays as it is.
     is_possible : callable
-        Whether the bin can stand at a pose; where it cannot, the margin ends.
+        Whether the bin can stand at a pose, with the arm at the scan configuration.
     evaluator : Evaluator
 
     Returns
@@ -44,41 +47,43 @@ def margins(
     dict
         ``+x``, ``-x``, … ``-yaw`` to metres or radians.
     """
+    evaluator.expect(MOST_POSES)
     here = evaluator.evaluate([pose], q, grid=THIN)[0].score
     if here is None:
         return {}
     least = here.score - DROP_POINTS
-    directions = [(k, sign) for k in range(4) for sign in (1.0, -1.0)]
-    spans = {direction: (0, len(SHIFTS_M)) for direction in directions}
+    directions = [(k, sign) for k in range(len(AXES)) for sign in (1.0, -1.0)]
+    # Rungs below the first number hold; the rung at the second does not.
+    spans = {d: (0, _possible_rungs(pose, d, is_possible)) for d in directions}
+    rung = {d: high - 1 for d, (_, high) in spans.items()}
     while pending := [d for d, (low, high) in spans.items() if low < high]:
-        # Rungs below `low` hold; the rung at `high` and those above do not.
-        middle = {d: _next_rung(*spans[d]) for d in pending}
-        poses = {d: _moved(pose, d, middle[d]) for d in pending}
-        possible = [d for d in pending if is_possible(poses[d])]
+        evaluator.expect(sum((high - low).bit_length() for low, high in spans.values()))
         found = evaluator.evaluate(
-            [poses[d] for d in possible],
+            [_moved(pose, d, rung[d]) for d in pending],
             q,
             above=float(np.nextafter(least, -np.inf)),
             enough=least,
             grid=THIN,
         )
-        holds = {
-            d
-            for d, e in zip(possible, found, strict=True)
-            if e.score is not None and e.score.score >= least
-        }
-        for d in pending:
+        for d, evaluation in zip(pending, found, strict=True):
             low, high = spans[d]
-            spans[d] = (middle[d] + 1, high) if d in holds else (low, middle[d])
+            holds = evaluation.score is not None and evaluation.score.score >= least
+            low, high = (rung[d] + 1, high) if holds else (low, rung[d])
+            spans[d], rung[d] = (low, high), (low + high) // 2
     return {
         f"{'+' if sign > 0 else '-'}{AXES[k]}": _rung(k, low - 1)
         for (k, sign), (low, _) in spans.items()
     }
 
 
-def _next_rung(low: int, high: int) -> int:
-    """The last of the ladder first, then the middle."""
-    return high - 1 if high - low == len(SHIFTS_M) else (low + high) // 2
+def _possible_rungs(
+    pose: Pose, direction: Direction, is_possible: Callable[[Pose], bool]
+) -> int:
+    """How many rungs the bin can be moved by, one after the other."""
+    for index in range(len(SHIFTS_M)):
+        if not is_possible(_moved(pose, direction, index)):
+            return index
+    return len(SHIFTS_M)
 
 
 def _rung(axis: int, index: int) -> float:
@@ -86,7 +91,7 @@ def _rung(axis: int, index: int) -> float:
     return ladder[index] if index >= 0 else 0.0
 
 
-def _moved(pose: Pose, direction: tuple[int, float], index: int) -> Pose:
+def _moved(pose: Pose, direction: Direction, index: int) -> Pose:
     axis, sign = direction
     values = list(pose)
     values[axis] += sign * _rung(axis, index)

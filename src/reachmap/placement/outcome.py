@@ -8,14 +8,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from reachmap._typing import FloatArray
+from reachmap.core.bin_fit import BinFit
 from reachmap.errors import SceneError
+from reachmap.geometry import yaw_transform
 from reachmap.placement.candidates import Candidate
-from reachmap.placement.decision import Decision, Question
+from reachmap.placement.decision import SETTLING, Decision, Question
+from reachmap.placement.exact import Pose
+from reachmap.placement.imaging import UNSEEN
 from reachmap.placement.margins import margins
-from reachmap.placement.scan_choice import ScanChoice, can_choose, choose_scan
+from reachmap.placement.scan_choice import ScanChoice, choose_scan
 
 POSES_TRIED = 5
-UNSEEN = "no scan configuration images the bin"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -39,7 +42,7 @@ class Outcome:
 
 
 def settle(
-    question: Question, decision: Decision, *, keep_scan: bool, tries: int = POSES_TRIED
+    question: Question, decision: Decision, *, tries: int = POSES_TRIED
 ) -> Outcome:
     """Choose the best pose that can be imaged, and its scan configuration.
 
@@ -49,9 +52,6 @@ def settle(
     decision : Decision
         Its table gets a row for the chosen pose as seen from a new configuration,
         and reasons where there is none.
-    keep_scan : bool
-        Whether the cell's own configuration stays; it also does where the cell has
-        no camera on its tool.
     tries : int
         How many of the best poses may turn out not to be imaged.
 
@@ -61,11 +61,9 @@ def settle(
         No pose that was tried can be imaged.
     """
     rows = decision.table.rows
-    keep_scan = keep_scan or not can_choose(question.scene)
     for row in decision.ranked[:tries]:
-        scan = (
-            _kept(question, rows[row]) if keep_scan else _searched(question, rows[row])
-        )
+        question.evaluator.expect(SETTLING)
+        scan = _scan(question, rows[row])
         if scan is None:
             rows[row] = Candidate(pose=rows[row].pose, exact=True, reason=UNSEEN)
             continue
@@ -80,7 +78,7 @@ def settle(
             runner_up=decision.runner_up(pose, question.different_place_m),
             paper_choice=_paper_row(decision, row, chosen),
             scan=scan,
-            margin=margins(pose, scan.q, question.is_possible, question.evaluator),
+            margin=_margins(question, pose, scan.q),
         )
     raise SceneError(
         f"{question.loaded.source}: {UNSEEN} at any of the {min(tries, len(rows))} "
@@ -89,14 +87,23 @@ def settle(
     )
 
 
-def _kept(question: Question, candidate: Candidate) -> ScanChoice:
+def _scan(question: Question, candidate: Candidate) -> ScanChoice | None:
+    if not question.keep_scan:
+        return choose_scan(question.loaded, candidate.pose, question.evaluator)
     assert candidate.score is not None
     q: FloatArray = np.array(question.scene.scan_configuration)
     return ScanChoice(q=q, score=candidate.score, is_new=False)
 
 
-def _searched(question: Question, candidate: Candidate) -> ScanChoice | None:
-    return choose_scan(question.loaded, candidate.pose, question.evaluator)
+def _margins(question: Question, pose: Pose, q: FloatArray) -> dict[str, float]:
+    """Margins with the arm at a scan configuration, the region left aside."""
+    fit = BinFit(question.scene.robot, question.loaded, q)
+    return margins(
+        pose,
+        q,
+        lambda moved: fit.contact(yaw_transform(*moved)) is None,
+        question.evaluator,
+    )
 
 
 def _paper_row(decision: Decision, row: int, chosen: int) -> int:

@@ -16,11 +16,12 @@ from reachmap.placement.region import AXES, Region
 FIRST_STEPS = (0.04, 0.04, 0.04, np.radians(15.0))
 ROUNDS = 2
 MIN_GAIN_POINTS = 0.25
+MOST_POSES = ROUNDS * 2 * len(AXES)
 
 
 def refine(
     start: Candidate,
-    q: FloatArray,
+    q: FloatArray | None,
     region: Region,
     reason_against: Callable[[Pose], str],
     evaluator: Evaluator,
@@ -35,8 +36,8 @@ def refine(
     ----------
     start : Candidate
         With an exact score.
-    q : array, shape (dof,)
-        Scan configuration.
+    q : array, shape (dof,), or None
+        Scan configuration; see :meth:`Evaluator.evaluate`.
     region : Region
     reason_against : callable
         Why a pose is not feasible, "" if it is.

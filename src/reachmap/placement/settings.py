@@ -10,6 +10,7 @@ from reachmap.placement import (
     decision,
     exact,
     footprint,
+    imaging,
     margins,
     places,
     refine,
@@ -45,7 +46,7 @@ def placement_settings() -> dict[str, Any]:
             "roll_step_deg": viewpoints.ROLL_STEP_DEG,
             "offsets": list(viewpoints.OFFSETS),
             "finalists": scan_choice.FINALISTS,
-            "apart_rad": scan_choice.APART_RAD,
+            "apart_rad": imaging.APART_RAD,
             "equal_points": scan_choice.EQUAL_POINTS,
         },
     }

@@ -72,6 +72,10 @@ class Progress:
         self._samples = deque([(self._started_s, done)])
         self._show()
 
+    def expect(self, total: int) -> None:
+        """Correct how many frames there are."""
+        self._total = max(total, self._done)
+
     def add(self, frames: int, ok: int) -> None:
         """Count frames that were just done."""
         self._done += frames

@@ -34,6 +34,7 @@ from reachmap.placement.decision import (
 )
 from reachmap.placement.evaluator import Evaluator, open_evaluator
 from reachmap.placement.exact import Pose
+from reachmap.placement.imaging import can_choose
 from reachmap.placement.outcome import Outcome, settle
 from reachmap.placement.region import AXES, Region, region_of
 from reachmap.placement.settings import placement_settings
@@ -79,7 +80,7 @@ class PlacementChoice:
     top : int
         Different places that are mapped with the bin in the scene.
     keep_scan_configuration : bool
-        Leave the cell's own.
+        Leave the cell's own, as is also done without a camera on the tool.
     """
 
     rule: str = "search"
@@ -140,14 +141,13 @@ def place_bin(
         executor=run.executor,
         progress=Progress("place-bin", quiet=run.quiet),
     ) as evaluator:
-        question = _question(loaded, workspace_map, region, evaluator)
+        question = _question(loaded, workspace_map, region, choice, evaluator)
         with clock.phase("decide"):
             decision = _decide(question, choice)
         with clock.phase("settle"):
             outcome = settle(
                 question,
                 decision,
-                keep_scan=choice.keep_scan_configuration,
                 tries=5 if choice.rule == "search" and not choice.bin_pose else 1,
             )
         clock.add_cpu("workers", evaluator.cpu_s if run.workers > 1 else 0.0)
@@ -196,16 +196,23 @@ def _region(
 
 
 def _question(
-    loaded: LoadedCell, workspace: WorkspaceMap, region: Region, evaluator: Evaluator
+    loaded: LoadedCell,
+    workspace: WorkspaceMap,
+    region: Region,
+    choice: PlacementChoice,
+    evaluator: Evaluator,
 ) -> Question:
     scene = Scene.build(loaded, with_bin=False)
     scene.require_free_scan_configuration()
+    keep_scan = choice.keep_scan_configuration or not can_choose(scene)
+    q = scene.scan_configuration if keep_scan else None
     return Question(
         loaded=loaded,
         workspace=workspace,
         region=region,
         scene=scene,
-        fit=BinFit(scene.robot, loaded, scene.scan_configuration),
+        keep_scan=keep_scan,
+        fit=BinFit(scene.robot, loaded, q),
         evaluator=evaluator,
     )
 
