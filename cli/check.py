@@ -57,6 +57,8 @@ def _lines(answer: CellCheck, *, verbose: bool) -> Iterator[str]:
     yield f"tcp     on {answer.tcp_parent}, approach {answer.approach_axis}"
     yield f"        at the scan configuration ({point}) m, approaching ({direction})"
     yield f"ik      {answer.ik_method}, {exact}"
+    if answer.ik_approximation:
+        yield f"        {answer.ik_approximation}"
     yield ""
     yield from _joint_table(answer)
     yield ""

@@ -104,6 +104,7 @@ def test_other_arms_can_start_and_look_down(name: str) -> None:
     assert answer.approach_at_scan == pytest.approx((0, 0, -1), abs=0.01)
     assert answer.warnings == ()
     assert answer.ik_complete == (name == "ur10-eye-in-hand")
+    assert ("panda_joint7 sampled" in answer.ik_approximation) != answer.ik_complete
 
 
 def test_shapes_in_words() -> None:

@@ -7,13 +7,15 @@ import sys
 from pathlib import Path
 
 
-def reachmap(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+def reachmap(
+    folder: Path, *arguments: str, timeout: float = 120.0
+) -> subprocess.CompletedProcess[str]:
     """Run the command in a folder, as a user would."""
     return subprocess.run(
         [sys.executable, "-m", "reachmap", *arguments],
         cwd=folder,
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=timeout,
         check=False,
     )

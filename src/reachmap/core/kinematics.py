@@ -60,7 +60,8 @@ class Kinematics:
     def __init__(self, robot: RobotModel, spec: IkSpec | None = None) -> None:
         self.robot = robot
         self.chain = SerialChain.from_robot(robot)
-        self._solver = _solver(robot, self.chain, spec or robot.ik)
+        self._spec = spec or robot.ik
+        self._solver = _solver(robot, self.chain, self._spec)
         self._follower = Follower(robot)
         self._data = robot.model.createData()
 
@@ -73,6 +74,23 @@ class Kinematics:
     def complete(self) -> bool:
         """Whether a pose without solutions is proved to have none."""
         return self._solver.complete
+
+    @property
+    def approximation(self) -> str:
+        """How solutions are sought where that proves nothing; "" if complete."""
+        solver = self._solver
+        if solver.complete:
+            return ""
+        if isinstance(solver, RedundantSolver):
+            name = self.robot.joint_names[solver.joint]
+            low, high = np.rad2deg([solver.values[0], solver.values[-1]])
+            return (
+                f"{name} sampled at {len(solver.values)} values from {low:.0f} to "
+                f"{high:.0f} deg, the other joints in closed form"
+            )
+        if isinstance(solver, NominalSolver):
+            return "closed form of the nominal arm, corrected by Newton steps"
+        return f"least squares from {self._spec.restarts} starts"
 
     def forward(self, q: FloatArray) -> FloatArray:
         """TCP pose T_base_tcp of a configuration, (dof,) to (4, 4)."""

@@ -31,11 +31,13 @@ def roadmap_settings() -> dict[str, Any]:
 def checking_settings(scene: Scene) -> dict[str, Any]:
     """Collision and kinematics settings, as stored in artefacts."""
     cell = scene.loaded.cell
+    approximation = scene.kinematics.approximation
     return {
         "collision": cell.collision.model_dump(mode="json"),
         "verification_is_proof": scene.motions.is_proof,
         "ik_method": scene.kinematics.method,
         "ik_complete": scene.kinematics.complete,
+        **({"ik_approximation": approximation} if approximation else {}),
         "with_bin": scene.with_bin,
         "pairs_proved_never_to_meet": list(scene.checker.proved_pairs),
     }

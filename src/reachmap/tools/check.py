@@ -51,7 +51,7 @@ class CellCheck:
         TCP in robot_base at the scan configuration [m].
     approach_at_scan : tuple of float
         Approach direction there, unit vector in robot_base.
-    ik_method, ik_complete : str, bool
+    ik_method, ik_complete, ik_approximation : str, bool, str
         How inverse kinematics is solved, and whether "no solution" is a proof.
     pairs : tuple of str
         ``"A | B"`` that are checked for collision.
@@ -74,6 +74,7 @@ class CellCheck:
     approach_at_scan: tuple[float, ...]
     ik_method: str
     ik_complete: bool
+    ik_approximation: str
     joints: tuple[JointRow, ...]
     bodies: tuple[BodyRow, ...]
     pairs: tuple[str, ...]
@@ -123,6 +124,7 @@ def check_loaded(loaded: LoadedCell) -> CellCheck:
         approach_at_scan=_rounded(sign * T_base_tcp[:3, column]),
         ik_method=scene.kinematics.method,
         ik_complete=scene.kinematics.complete,
+        ik_approximation=scene.kinematics.approximation,
         joints=_joints(scene),
         bodies=_bodies(loaded),
         pairs=scene.checker.body_pairs,

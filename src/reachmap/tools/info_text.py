@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Mapping
 
 import numpy as np
@@ -18,7 +19,7 @@ from reachmap.maps.workspace_summary import (
     WorkspaceSummary,
 )
 from reachmap.plots.levels import level_names
-from reachmap.tools.info import ArtefactInfo
+from reachmap.tools.info import ArtefactInfo, ik_approximation
 from reachmap.tools.text_table import (
     count_text,
     fact_lines,
@@ -28,6 +29,7 @@ from reachmap.tools.text_table import (
 )
 
 PAIRS_SHOWN = 5
+LINE = 88
 
 
 def info_text(info: ArtefactInfo) -> str:
@@ -39,7 +41,8 @@ def info_text(info: ArtefactInfo) -> str:
         body = _bin_lines(summary)
     else:
         body = _placement_lines(summary)
-    return "\n".join([_headline(info), *body, "", "Made from", *_origin_lines(info)])
+    lines = [_headline(info), *_approximation_lines(info), *body, "", "Made from"]
+    return "\n".join([*lines, *_origin_lines(info)])
 
 
 def _headline(info: ArtefactInfo) -> str:
@@ -51,6 +54,15 @@ def _headline(info: ArtefactInfo) -> str:
         f"{info.path}: {kind}, format {stamp.format_version}, "
         f"content {stamp.content_sha256[:12]}"
     )
+
+
+def _approximation_lines(info: ArtefactInfo) -> list[str]:
+    """What "no IK solution" rests on, where that proves nothing."""
+    text = ik_approximation(info.record.provenance.settings)
+    if not text:
+        return []
+    said = f'inverse kinematics is approximate ({text}), so that "no IK solution" '
+    return textwrap.wrap(f"{said}means that none was found this way", LINE)
 
 
 def _workspace_lines(summary: WorkspaceSummary) -> list[str]:

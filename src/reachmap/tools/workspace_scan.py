@@ -19,6 +19,7 @@ from reachmap.maps import (
     check_output,
     write_workspace_map,
 )
+from reachmap.maps.statistics import level_means
 from reachmap.sampling.frames import workspace_frames
 from reachmap.scans.document import checking_settings, roadmap_settings, scan_document
 from reachmap.scans.progress import Progress
@@ -155,7 +156,8 @@ def summary_of_workspace(workspace: WorkspaceMap | None) -> dict[str, Any]:
     """Headline of a map: frames, best level, percentages; empty for a shard."""
     if workspace is None:
         return {}
-    level = workspace.path_reachability.mean(axis=(1, 2))
+    # Cubes of different lattices leave squares between them that have no value.
+    level = level_means(workspace.path_reachability)
     best = int(np.nanargmax(level))
     status = np.concatenate([c.status.ravel() for c in workspace.cubes.values()])
     return {
