@@ -12,7 +12,7 @@ import pinocchio as pin
 
 from reachmap._typing import BoolArray, FloatArray
 from reachmap.core.bodies import ROOT, BinBox, bin_boxes, build_geometry
-from reachmap.core.placed import PlacedBodies, PlacedBody, bodies_at
+from reachmap.core.placed import PlacedBodies, PlacedBody, bodies_at, box_around
 from reachmap.geometry import inverse_transform, transform_from_parts
 
 if TYPE_CHECKING:
@@ -140,16 +140,19 @@ class ToolFit:
 
     def blocked(self, T_bin_tcp: FloatArray) -> BoolArray:
         """Whether the tool touches the bin, shape (n, 4, 4) to (n,)."""
-        return np.array([self._is_blocked(T) for T in T_bin_tcp], bool)
-
-    def _is_blocked(self, T_bin_tcp: FloatArray) -> bool:
+        blocked = np.zeros(len(T_bin_tcp), bool)
         for body in self._tool:
-            touched = self._walls.first_touched(body.shape, T_bin_tcp @ body.T)
-            if touched >= 0 and not self._allowed(
-                self._walls.bodies[touched].name, body.name
-            ):
-                return True
-        return False
+            T_bin_body = T_bin_tcp @ body.T
+            forbidden = np.array(
+                [not self._allowed(w.name, body.name) for w in self._walls.bodies]
+            )
+            near = self._walls.near_many(*box_around(body.shape, T_bin_body))
+            near &= forbidden
+            for row in np.flatnonzero(near.any(axis=1) & ~blocked):
+                among = np.flatnonzero(near[row]).tolist()
+                hit = self._walls.touching(body.shape, T_bin_body[row], among)
+                blocked[row] = hit >= 0
+        return blocked
 
 
 class _Touches:

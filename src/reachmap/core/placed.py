@@ -14,7 +14,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from reachmap._typing import FloatArray
+from reachmap._typing import BoolArray, FloatArray
 from reachmap.core.bodies import BodyGeometry
 from reachmap.core.robot import RobotModel
 
@@ -52,7 +52,7 @@ class PlacedBodies:
     def __init__(self, bodies: Iterable[PlacedBody], margin_m: float = 0.0) -> None:
         self.bodies = tuple(bodies)
         self._transforms = [_transform(body.T) for body in self.bodies]
-        boxes = [_box(body.shape, body.T) for body in self.bodies]
+        boxes = [box_around(body.shape, body.T) for body in self.bodies]
         self._low = np.array([low for low, _ in boxes]).reshape(-1, 3) - margin_m
         self._high = np.array([high for _, high in boxes]).reshape(-1, 3) + margin_m
         self._request = coal.CollisionRequest()
@@ -61,8 +61,12 @@ class PlacedBodies:
 
     def near(self, low: FloatArray, high: FloatArray) -> list[int]:
         """Bodies whose boxes meet the box between two corners (3,)."""
-        hit = ((self._low <= high) & (self._high >= low)).all(axis=1)
-        return [int(k) for k in np.flatnonzero(hit)]
+        return np.flatnonzero(self.near_many(low, high)).tolist()
+
+    def near_many(self, low: FloatArray, high: FloatArray) -> BoolArray:
+        """Whether boxes between corners (..., 3) meet those of the bodies, (..., n)."""
+        below, above = low[..., None, :], high[..., None, :]
+        return np.asarray(((self._low <= above) & (self._high >= below)).all(axis=-1))
 
     def touching(self, shape: Any, T: FloatArray, among: Sequence[int]) -> int:
         """First body of ``among`` that a shape at T touches, or -1."""
@@ -84,7 +88,7 @@ class PlacedBodies:
 
     def first_touched(self, shape: Any, T: FloatArray) -> int:
         """First body that a shape at T touches, or -1."""
-        return self.touching(shape, T, self.near(*_box(shape, T)))
+        return self.touching(shape, T, self.near(*box_around(shape, T)))
 
 
 def bodies_at(
@@ -113,16 +117,16 @@ def convex_hull(points: FloatArray) -> Any:
     return coal.Convex.convexHull(vector, True, "Qt")
 
 
+def box_around(shape: Any, T: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Corners (..., 3) of the boxes around a shape at poses T (..., 4, 4)."""
+    shape.computeLocalAABB()
+    low, high = np.array(shape.aabb_local.min_), np.array(shape.aabb_local.max_)
+    centre = T[..., :3, :3] @ ((low + high) / 2) + T[..., :3, 3]
+    half = np.abs(T[..., :3, :3]) @ ((high - low) / 2)
+    return centre - half, centre + half
+
+
 def _transform(T: FloatArray) -> Any:
     return coal.Transform3s(
         np.ascontiguousarray(T[:3, :3]), np.ascontiguousarray(T[:3, 3])
     )
-
-
-def _box(shape: Any, T: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Corners of the box around a shape at T."""
-    shape.computeLocalAABB()
-    low, high = np.array(shape.aabb_local.min_), np.array(shape.aabb_local.max_)
-    centre = T[:3, :3] @ ((low + high) / 2) + T[:3, 3]
-    half = np.abs(T[:3, :3]) @ ((high - low) / 2)
-    return centre - half, centre + half

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from reachmap._typing import FloatArray
-from reachmap.core.bin_fit import BinFit, ToolFit
+from reachmap._typing import BoolArray, FloatArray
+from reachmap.core.bin_fit import BinFit
 from reachmap.core.scene import Scene
 from reachmap.errors import SceneError
-from reachmap.geometry import transform_from_parts, yaw_transform
+from reachmap.geometry import yaw_transform
 from reachmap.maps.records import WorkspaceMap
 from reachmap.placement import margins, refine
 from reachmap.placement.candidates import Candidate, CandidateTable
@@ -52,6 +51,8 @@ class Question:
     ----------
     loaded : LoadedCell
     workspace : WorkspaceMap
+    is_open : bool array, shape (layers, y, x, orientations)
+        See :func:`reachmap.placement.sample.open_frames`.
     region : Region
     scene : Scene
         Without the bin.
@@ -64,6 +65,7 @@ class Question:
 
     loaded: LoadedCell
     workspace: WorkspaceMap
+    is_open: BoolArray
     region: Region
     scene: Scene
     keep_scan: bool
@@ -247,15 +249,9 @@ def paper_pose(question: Question) -> Pose | None:
 
 def _predicted(question: Question) -> list[Candidate]:
     """Best pose at each place, by interpolation of the map."""
-    workspace, loaded = question.workspace, question.loaded
+    workspace = question.workspace
     grid = pose_grid(question.region, workspace.x, workspace.y, workspace.z)
-    footprint = footprint_of(loaded.cell)
-    blocked = ToolFit(question.scene.robot, loaded).blocked(
-        transform_from_parts(footprint.R, footprint.points[:, None]).reshape(-1, 4, 4)
-    )
-    footprint = dataclasses.replace(
-        footprint, open=~blocked.reshape(footprint.open.shape)
-    )
+    footprint = footprint_of(question.loaded.cell, question.is_open)
     prediction = predict(field_of(workspace), footprint, grid)
     return list(best_at_each_place(prediction, question.reason_against))
 

@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from reachmap._typing import FloatArray
+from reachmap._typing import BoolArray, FloatArray
 from reachmap.errors import EngineError
 from reachmap.placement.exact import ALWAYS, NEVER, PlacedScene, Pose, PoseScore
-from reachmap.placement.footprint import COARSE, Grid
 from reachmap.placement.imaging import UNSEEN, imaging_configurations
+from reachmap.placement.sample import COARSE, Grid, Sample, sample_of
 from reachmap.scans.crew import Crew
 from reachmap.scans.encoding import json_from_value, value_from_json
 from reachmap.scans.executors import open_lanes
@@ -105,8 +105,8 @@ class Evaluator:
             or of each.
         enough : float
             A score from which on no more is looked for [percent].
-        grid : (int, int)
-            See :func:`reachmap.placement.footprint.sample_of`.
+        grid : (int, int, int)
+            See :func:`reachmap.placement.sample.sample_of`.
         """
         start = np.zeros(0) if q is None else q
         starts = np.broadcast_to(start, (len(poses), start.shape[-1]))
@@ -144,15 +144,30 @@ class Evaluator:
 
 @contextmanager
 def open_evaluator(
-    loaded: LoadedCell, *, workers: int, executor: str, progress: Progress
+    loaded: LoadedCell,
+    is_open: BoolArray,
+    *,
+    workers: int,
+    executor: str,
+    progress: Progress,
 ) -> Iterator[Evaluator]:
-    """Start workers that score poses, and stop them afterwards."""
+    """Start workers that score poses, and stop them afterwards.
+
+    Parameters
+    ----------
+    loaded : LoadedCell
+    is_open : bool array, shape (layers, y, x, orientations)
+        See :func:`reachmap.placement.sample.open_frames`.
+    workers : int
+    executor : str
+    progress : Progress
+    """
     job = Job(
         function=evaluate_unit,
         prepare=Prepared,
         encode=json_from_value,
         tally=one_frame,
-        context=loaded,
+        context=(loaded, is_open),
         packages=package_versions(),
     )
     parcel = Parcel(key=secrets.token_hex(16), job=job)
@@ -162,17 +177,26 @@ def open_evaluator(
 
 
 class Prepared:
-    """A worker's scenes; the last few are kept."""
+    """A worker's scenes; the last few are kept.
 
-    def __init__(self, loaded: LoadedCell) -> None:
-        self.loaded = loaded
+    Parameters
+    ----------
+    context : (LoadedCell, bool array)
+        See :func:`open_evaluator`.
+    """
+
+    def __init__(self, context: tuple[LoadedCell, BoolArray]) -> None:
+        self.loaded, self.is_open = context
+        self._samples: dict[Grid, Sample] = {}
         self._scenes: OrderedDict[tuple[Grid, Pose], PlacedScene] = OrderedDict()
 
     def scene_at(self, pose: Pose, grid: Grid) -> PlacedScene:
         """Scene with the bin at a pose."""
+        if grid not in self._samples:
+            self._samples[grid] = sample_of(self.loaded.cell, grid, self.is_open)
         key = (grid, pose)
         if key not in self._scenes:
-            self._scenes[key] = PlacedScene(self.loaded, pose, grid)
+            self._scenes[key] = PlacedScene(self.loaded, pose, self._samples[grid])
         self._scenes.move_to_end(key)
         while len(self._scenes) > SCENES_KEPT:
             self._scenes.popitem(last=False)
@@ -181,8 +205,8 @@ class Prepared:
 
 def evaluate_unit(prepared: Prepared, unit: int) -> dict[str, Any]:
     """Score one pose; the unit's number says which, see :func:`unit_of_numbers`."""
-    across, along, enough, x, y, z, yaw, *rest = numbers_of_unit(unit)
-    placed = prepared.scene_at((x, y, z, yaw), (int(across), int(along)))
+    along, across, part, enough, x, y, z, yaw, *rest = numbers_of_unit(unit)
+    placed = prepared.scene_at((x, y, z, yaw), (int(along), int(across), int(part)))
     q, reason = start_of(placed, np.array(rest[:-1]) if rest[:-1] else None)
     if q is None:
         return {"bound": 0.0, "reason": reason, "score": None}

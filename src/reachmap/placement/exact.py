@@ -1,4 +1,4 @@
-"""The exact score of a bin pose: roadmap to a coarse grid, bin in the scene.
+"""The exact score of a bin pose: roadmap to a sample of frames, bin in the scene.
 
 What a score costs is mostly straight approaches, so they are looked at lazily: one
 branch of each frame's inverse kinematics first, the others only if the frame is not
@@ -18,7 +18,7 @@ from reachmap.core.connection import ROADMAP_PLANNER, Connection, connect
 from reachmap.core.planning import Planner
 from reachmap.core.scene import Scene
 from reachmap.geometry import yaw_transform
-from reachmap.placement.footprint import COARSE, Grid, sample_of
+from reachmap.placement.sample import Sample
 
 if TYPE_CHECKING:
     from reachmap.cell.loading import LoadedCell
@@ -39,7 +39,7 @@ class PoseScore:
     score : float
         Mean path reachability over the pick volume [percent].
     worst_point : float
-        Path reachability of the worst point [percent].
+        Path reachability of the worst of the points that were looked at [percent].
     reachable_share : float
         Share of test frames with an IK solution [percent], which no path can exceed.
     path_length_rad : float
@@ -60,11 +60,11 @@ class PlacedScene:
     ----------
     loaded : LoadedCell
     pose : (x, y, z [m], yaw [rad])
-    grid : (int, int)
-        See :func:`reachmap.placement.footprint.sample_of`.
+    sample : Sample
 
     Attributes
     ----------
+    pose : (x, y, z [m], yaw [rad])
     scene : Scene
     T : array, shape (frames, 4, 4)
         T_base_tcp.
@@ -75,16 +75,13 @@ class PlacedScene:
         Frame of each, rising.
     """
 
-    def __init__(self, loaded: LoadedCell, pose: Pose, grid: Grid = COARSE) -> None:
+    def __init__(self, loaded: LoadedCell, pose: Pose, sample: Sample) -> None:
         changed = loaded.with_changes(bin_pose=yaw_transform(*pose))
+        self.pose = pose
         self.scene = Scene.build(changed, with_bin=True)
         cell = changed.cell
-        sample = sample_of(cell, grid, self.scene.T_base_bin)
-        self.T = sample.frames.transforms_at(slice(None))
-        self._point_weights = sample.weights
-        self._weights = np.repeat(
-            sample.weights / sample.frames.shape[-1], sample.frames.shape[-1]
-        )
+        self.T = self.scene.T_base_bin @ sample.T_bin_tcp
+        self._sample = sample
         self._approach = StraightApproach(
             self.scene.kinematics,
             self.scene.motions,
@@ -108,8 +105,8 @@ class PlacedScene:
 
     @property
     def bound(self) -> float:
-        """Share of frames with a free configuration [percent]; no score is higher."""
-        return 100.0 * float(self._weights @ (np.diff(self._begin) > 0))
+        """What frames with a free configuration count for; no score is higher [%]."""
+        return 100.0 * float(self._sample.weight @ (np.diff(self._begin) > 0))
 
     def score_from(
         self, q: FloatArray, *, above: float = ALWAYS, enough: float = NEVER
@@ -161,7 +158,7 @@ class PlacedScene:
                 if self._try_next(goals, int(k)):
                     break
             else:
-                goals.bound -= 100.0 * float(self._weights[k])
+                goals.bound -= 100.0 * float(self._sample.weight[k])
                 if goals.bound <= above:
                     break
         return goals
@@ -201,19 +198,18 @@ class PlacedScene:
         return connect(q, Q, frame, planner, attempts=ATTEMPTS, seed=seed)
 
     def _score(self, connection: Connection) -> PoseScore:
-        count = len(self.T)
-        length = np.full(count, np.inf)
+        sample = self._sample
+        length = np.full(len(self.T), np.inf)
         roadmap = connection.roadmap
         to_goals = roadmap.shortest_paths().length_rad[1 : len(roadmap.frame) + 1]
         np.minimum.at(length, roadmap.frame, to_goals)
         found = np.isfinite(length)
-        points = 100.0 * found.reshape(len(self._point_weights), -1).mean(axis=1)
         return PoseScore(
-            score=float(self._point_weights @ points),
-            worst_point=float(points.min()),
-            reachable_share=100.0 * float(self._weights @ self._has_ik),
+            score=100.0 * float(sample.weight @ found),
+            worst_point=100.0 * sample.worst_point(found),
+            reachable_share=100.0 * float(sample.share @ self._has_ik),
             path_length_rad=(
-                float(np.average(length[found], weights=self._weights[found]))
+                float(np.average(length[found], weights=sample.share[found]))
                 if found.any()
                 else np.inf
             ),
@@ -232,7 +228,7 @@ class _Goals:
     tried : int array, shape (frames,)
         Next row of the branches for each frame.
     bound : float
-        Share of frames that have a goal or were not looked at [percent].
+        What the frames count for that have a goal or were not looked at [percent].
     """
 
     tried: IntArray

@@ -9,8 +9,8 @@ import numpy as np
 from reachmap._typing import FloatArray
 from reachmap.placement.evaluator import Evaluator
 from reachmap.placement.exact import Pose
-from reachmap.placement.footprint import THIN
 from reachmap.placement.region import AXES
+from reachmap.placement.sample import THIN
 
 DROP_POINTS = 5.0
 SHIFTS_M = (0.01, 0.02, 0.03, 0.05, 0.07, 0.10, 0.15)
@@ -56,8 +56,8 @@ def margins(
     # Rungs below the first number hold; the rung at the second does not.
     spans = {d: (0, _possible_rungs(pose, d, is_possible)) for d in directions}
     rung = {d: high - 1 for d, (_, high) in spans.items()}
+    evaluator.expect(sum(high.bit_length() + 1 for _, high in spans.values() if high))
     while pending := [d for d, (low, high) in spans.items() if low < high]:
-        evaluator.expect(sum((high - low).bit_length() for low, high in spans.values()))
         found = evaluator.evaluate(
             [_moved(pose, d, rung[d]) for d in pending],
             q,
@@ -70,6 +70,8 @@ def margins(
             holds = evaluation.score is not None and evaluation.score.score >= least
             low, high = (rung[d] + 1, high) if holds else (low, rung[d])
             spans[d], rung[d] = (low, high), (low + high) // 2
+        # A bisection of n rungs takes as many steps as n has bits.
+        evaluator.expect(sum((high - low).bit_length() for low, high in spans.values()))
     return {
         f"{'+' if sign > 0 else '-'}{AXES[k]}": _rung(k, low - 1)
         for (k, sign), (low, _) in spans.items()

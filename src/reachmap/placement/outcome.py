@@ -13,9 +13,10 @@ from reachmap.errors import SceneError
 from reachmap.geometry import yaw_transform
 from reachmap.placement.candidates import Candidate
 from reachmap.placement.decision import SETTLING, Decision, Question
-from reachmap.placement.exact import Pose
+from reachmap.placement.exact import PlacedScene, Pose
 from reachmap.placement.imaging import UNSEEN
 from reachmap.placement.margins import margins
+from reachmap.placement.sample import THIN, sample_of
 from reachmap.placement.scan_choice import ScanChoice, choose_scan
 
 POSES_TRIED = 5
@@ -89,7 +90,9 @@ def settle(
 
 def _scan(question: Question, candidate: Candidate) -> ScanChoice | None:
     if not question.keep_scan:
-        return choose_scan(question.loaded, candidate.pose, question.evaluator)
+        sample = sample_of(question.loaded.cell, THIN, question.is_open)
+        placed = PlacedScene(question.loaded, candidate.pose, sample)
+        return choose_scan(placed, question.evaluator)
     assert candidate.score is not None
     q: FloatArray = np.array(question.scene.scan_configuration)
     return ScanChoice(q=q, score=candidate.score, is_new=False)

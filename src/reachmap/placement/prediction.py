@@ -53,7 +53,7 @@ def orientation_shares(
     -------
     open_shares, all_shares : array, shape (np, no)
         Share of a point's frames that are looked up under each orientation, of those
-        that are open and of all.
+        that the tool can take and of all.
     """
     c, s = np.cos(yaw_rad), np.sin(yaw_rad)
     turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])

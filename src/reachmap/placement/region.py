@@ -31,12 +31,7 @@ class Region:
     def outside(self, pose: FloatArray) -> str:
         """Name of the first value of a pose (4,) that is outside, or ""."""
         for k, name in enumerate(AXES):
-            value = float(pose[k])
-            if name == "yaw":
-                # A bin turned by half a turn is the same bin.
-                middle = (self.low[k] + self.high[k]) / 2
-                value = middle + (value - middle + np.pi / 2) % np.pi - np.pi / 2
-            if not self.low[k] - SLACK <= value <= self.high[k] + SLACK:
+            if not _is_inside(name, float(pose[k]), self.low[k], self.high[k]):
                 return name
         return ""
 
@@ -68,7 +63,7 @@ def region_of(
     Raises
     ------
     SettingsError
-        Nothing is left of a range.
+        Nothing is left of a range, or a fixed value is outside.
     """
     yaw = np.radians(spec.yaw_deg)
     ranges: dict[str, tuple[float, float]] = {
@@ -76,17 +71,36 @@ def region_of(
         for name, values in lattice.items()
     }
     ranges["yaw"] = (float(yaw[0]), float(yaw[1]))
-    for name, (low, high) in (limits or {}).items():
-        ranges[name] = (max(low, ranges[name][0]), min(high, ranges[name][1]))
+    for name, wanted in (limits or {}).items():
+        low, high = ranges[name]
+        ranges[name] = (max(low, wanted[0]), min(high, wanted[1]))
+        if ranges[name][0] > ranges[name][1]:
+            said = f"{name} from {wanted[0]:g} to {wanted[1]:g}"
+            raise SettingsError(f"{said} leaves no place: {_only(name, low, high)}")
     for name, value in (fixed or {}).items():
+        if not _is_inside(name, value, *ranges[name]):
+            said = f"{name} = {np.degrees(value) if name == 'yaw' else value:g}"
+            raise SettingsError(f"{said} is not possible: {_only(name, *ranges[name])}")
         ranges[name] = (value, value)
-    for name, (low, high) in ranges.items():
-        if low > high:
-            raise SettingsError(
-                f"no value of {name} is left: {low:g} to {high:g} after the cell's "
-                "placement limits and the region"
-            )
     return Region(
         low=np.array([ranges[n][0] for n in AXES]),
         high=np.array([ranges[n][1] for n in AXES]),
+    )
+
+
+def _is_inside(name: str, value: float, low: float, high: float) -> bool:
+    if name == "yaw":
+        # A bin turned by half a turn is the same bin.
+        middle = (low + high) / 2
+        value = middle + (value - middle + np.pi / 2) % np.pi - np.pi / 2
+    return low - SLACK <= value <= high + SLACK
+
+
+def _only(name: str, low: float, high: float) -> str:
+    """What the cell's placement limits, the map and the user's region leave."""
+    if name == "yaw":
+        low, high = float(np.degrees(low)), float(np.degrees(high))
+    return (
+        f"the bin may stand only from {low:g} to {high:g} (the map, the cell's "
+        "placement limits and the region)"
     )

@@ -4,17 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import islice
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from reachmap._typing import FloatArray
 from reachmap.placement.evaluator import Evaluator
-from reachmap.placement.exact import PlacedScene, Pose, PoseScore
+from reachmap.placement.exact import PlacedScene, PoseScore
 from reachmap.placement.imaging import imaging_configurations
-
-if TYPE_CHECKING:
-    from reachmap.cell.loading import LoadedCell
 
 FINALISTS = 6
 EQUAL_POINTS = 0.5
@@ -39,9 +35,7 @@ class ScanChoice:
     is_new: bool
 
 
-def choose_scan(
-    loaded: LoadedCell, pose: Pose, evaluator: Evaluator
-) -> ScanChoice | None:
+def choose_scan(placed: PlacedScene, evaluator: Evaluator) -> ScanChoice | None:
     """Find the best configuration that images the bin at a pose.
 
     Among the few that promise the shortest paths, the highest score wins; of scores
@@ -49,9 +43,8 @@ def choose_scan(
 
     Parameters
     ----------
-    loaded : LoadedCell
-        With a camera on the tool.
-    pose : (x, y, z [m], yaw [rad])
+    placed : PlacedScene
+        Of a cell with a camera on the tool.
     evaluator : Evaluator
 
     Returns
@@ -59,11 +52,10 @@ def choose_scan(
     ScanChoice or None
         None if no configuration images the bin.
     """
-    placed = PlacedScene(loaded, pose)
     finalists = list(islice(imaging_configurations(placed), FINALISTS))
     if not finalists:
         return None
-    found = evaluator.evaluate([pose] * len(finalists), np.array(finalists))
+    found = evaluator.evaluate([placed.pose] * len(finalists), np.array(finalists))
     scored = [
         (e.score, q)
         for e, q in zip(found, finalists, strict=True)

@@ -14,6 +14,7 @@ from reachmap.placement import (
     margins,
     places,
     refine,
+    sample,
     scan_choice,
     viewpoints,
 )
@@ -23,10 +24,11 @@ def placement_settings() -> dict[str, Any]:
     """Everything that a placement depends on besides the cell, the map and options."""
     return {
         "samples": {
-            "thin": list(footprint.THIN),
-            "coarse": list(footprint.COARSE),
+            "predicted": list(footprint.POINTS),
+            "thin": list(sample.THIN),
+            "coarse": list(sample.COARSE),
         },
-        "max_layers": footprint.MAX_LAYERS,
+        "max_layers": sample.MAX_LAYERS,
         "attempts": exact.ATTEMPTS,
         "steps_per_square": places.STEPS_PER_SQUARE,
         "yaw_step_deg": places.YAW_STEP_DEG,

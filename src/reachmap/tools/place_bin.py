@@ -32,11 +32,12 @@ from reachmap.placement.decision import (
     decide_by_paper,
     decide_by_search,
 )
-from reachmap.placement.evaluator import Evaluator, open_evaluator
+from reachmap.placement.evaluator import open_evaluator
 from reachmap.placement.exact import Pose
 from reachmap.placement.imaging import can_choose
 from reachmap.placement.outcome import Outcome, settle
 from reachmap.placement.region import AXES, Region, region_of
+from reachmap.placement.sample import open_frames
 from reachmap.placement.settings import placement_settings
 from reachmap.placement.summary import best_rows, placement_facts, row_facts
 from reachmap.placement.viewpoints import picture_corners
@@ -135,13 +136,28 @@ def place_bin(
         workspace_map.provenance, str(workspace), with_seed(overrides, seed)
     )
     region = _region(loaded, workspace_map, choice)
+    scene = Scene.build(loaded, with_bin=False)
+    scene.require_free_scan_configuration()
+    is_open = open_frames(scene.robot, loaded)
     with open_evaluator(
         loaded,
+        is_open,
         workers=run.workers,
         executor=run.executor,
         progress=Progress("place-bin", quiet=run.quiet),
     ) as evaluator:
-        question = _question(loaded, workspace_map, region, choice, evaluator)
+        keep_scan = choice.keep_scan_configuration or not can_choose(scene)
+        q = scene.scan_configuration if keep_scan else None
+        question = Question(
+            loaded=loaded,
+            workspace=workspace_map,
+            is_open=is_open,
+            region=region,
+            scene=scene,
+            keep_scan=keep_scan,
+            fit=BinFit(scene.robot, loaded, q),
+            evaluator=evaluator,
+        )
         with clock.phase("decide"):
             decision = _decide(question, choice)
         with clock.phase("settle"):
@@ -192,28 +208,6 @@ def _region(
         {"x": workspace.x, "y": workspace.y, "z": heights},
         limits=choice.limits,
         fixed=fixed,
-    )
-
-
-def _question(
-    loaded: LoadedCell,
-    workspace: WorkspaceMap,
-    region: Region,
-    choice: PlacementChoice,
-    evaluator: Evaluator,
-) -> Question:
-    scene = Scene.build(loaded, with_bin=False)
-    scene.require_free_scan_configuration()
-    keep_scan = choice.keep_scan_configuration or not can_choose(scene)
-    q = scene.scan_configuration if keep_scan else None
-    return Question(
-        loaded=loaded,
-        workspace=workspace,
-        region=region,
-        scene=scene,
-        keep_scan=keep_scan,
-        fit=BinFit(scene.robot, loaded, q),
-        evaluator=evaluator,
     )
 
 
