@@ -181,6 +181,19 @@ def test_filters_choose_the_points(app: Any) -> None:
 
 
 @pytest.mark.parametrize("app", ["workspace"], indirect=True)
+def test_a_click_shows_a_frame_in_the_state_let_through(app: Any) -> None:
+    """Who filters by a state wants to see why, not the frame that is reached."""
+    name = "every IK solution in collision"
+    app.state.value = name
+    app.refresh()
+    point = int(app.shown[-1])
+    app.show_point(point)
+    row = app._rows[int(app.frame.value)]
+    assert app.points.frames.point[row] == point
+    assert app.points.frames.status[row] == app.points.states()[name]
+
+
+@pytest.mark.parametrize("app", ["workspace"], indirect=True)
 def test_a_ray_means_the_nearest_point(app: Any) -> None:
     """From wherever it comes."""
     rng = np.random.default_rng(1)

@@ -154,7 +154,7 @@ class App:
         return int(self.shown[int(aside.argmin())])
 
     def show_point(self, point: int) -> None:
-        """Put the arm to the test frames of a point, the best of them first."""
+        """Put the arm to the best test frame of a point, or the best in the state."""
         self._rows = best_first(self.points, point)
         if not self._rows:
             share = self.points.main[point]
@@ -163,9 +163,18 @@ class App:
             return
         self.frame.max = max(len(self._rows) - 1, 1)
         self.frame.disabled = len(self._rows) < 2
-        if int(self.frame.value) != 0:
-            self.frame.value = 0
-        self.show_frame(0)
+        first = self._first_in_state()
+        if int(self.frame.value) != first:
+            self.frame.value = first
+        self.show_frame(first)
+
+    def _first_in_state(self) -> int:
+        """Place among the point's frames of the first in the state let through."""
+        code = self.points.states().get(str(self.state.value))
+        frames = self.points.frames
+        if code is None or frames is None:
+            return 0
+        return int(np.argmax(frames.status[self._rows] == code))
 
     def show_frame(self, number: int) -> None:
         """Show one test frame of the chosen point: the arm there, contacts in red."""

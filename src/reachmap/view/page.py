@@ -72,7 +72,7 @@ def _bin_page(
     record: BinMap,
     paths: Sequence[int],
 ) -> str:
-    stage.put_points(points, np.arange(len(points.position)), points.main, scale=0.7)
+    stage.put_points(points, np.arange(len(points.position)), points.main)
     played = [
         playback_of(record, row, stage.cell.robot)
         for row in (paths or choose_paths(record))

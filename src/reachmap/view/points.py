@@ -199,7 +199,7 @@ def _bin_points(record: BinMap) -> MapPoints:
         levels=tuple(f"{name} m above the bottom" for name in names),
         shares=_shares(frames, len(position)),
         frames=frames,
-        size_m=0.22 * _spacing(position),
+        size_m=0.26 * _step(record.x, record.y),
     )
 
 
@@ -248,7 +248,11 @@ def _shares(frames: Frames, count: int) -> dict[str, FloatArray]:
 
 
 def _spacing(position: FloatArray) -> float:
-    """Smallest usual distance between neighbours along an axis [m], 0.02 to 0.2."""
-    steps = [np.diff(np.unique(position[:, axis].round(4))) for axis in range(3)]
-    usual = [float(np.median(step)) for step in steps if step.size]
+    """Usual distance between neighbours on a lattice along the axes [m]."""
+    return _step(*(np.unique(position[:, axis].round(4)) for axis in range(3)))
+
+
+def _step(*axes: FloatArray) -> float:
+    """Smallest usual step along rising coordinates [m], 0.012 to 0.15."""
+    usual = [float(np.median(np.diff(values))) for values in axes if len(values) > 1]
     return float(np.clip(min(usual, default=0.05), 0.012, 0.15))

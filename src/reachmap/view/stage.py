@@ -224,12 +224,14 @@ class Stage:
         )
         low, high = corners.min(axis=0), corners.max(axis=0)
         middle, size = (low + high) / 2.0, float(np.linalg.norm(high - low))
-        self._top = np.array([middle[0], middle[1], high[2] + 0.10 * size])
+        self._top = np.array([middle[0], middle[1], high[2] + 0.03 * size])
         towards = np.array([0.78, -0.78, 0.55])
         camera = server.initial_camera
         camera.fov = float(np.radians(45.0))
-        camera.look_at = middle
-        camera.position = middle + 1.12 * size * towards
+        # A little below the middle: the label is above, the bin below.
+        aim = middle - np.array([0.0, 0.0, 0.03 * size])
+        camera.look_at = aim
+        camera.position = aim + 1.10 * size * towards
 
 
 def _split_at_creases(solid: Solid) -> tuple[FloatArray, IntArray]:
