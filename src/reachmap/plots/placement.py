@@ -6,16 +6,15 @@ from collections import Counter
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.collections import PathCollection
+from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patheffects import withStroke
 
-from reachmap._typing import FloatArray
+from reachmap._typing import BoolArray, FloatArray
 from reachmap.geometry import yaw_transform
 from reachmap.maps.records import BinPlacement, WorkspaceMap
 from reachmap.plots.context import CellContext, context_of
-from reachmap.plots.heatmap import draw_level_on
 from reachmap.plots.outlines import (
     Kind,
     Outline,
@@ -23,7 +22,13 @@ from reachmap.plots.outlines import (
     draw_outline,
     legend_lines,
 )
-from reachmap.plots.squares import MINUS, PERCENT_SCALE, axis_titles, colour_bar
+from reachmap.plots.squares import (
+    MINUS,
+    PERCENT_SCALE,
+    axis_titles,
+    colour_bar,
+    draw_squares,
+)
 from reachmap.plots.stack import LevelStack, height_text
 from reachmap.plots.style import (
     BIN_COLOUR,
@@ -82,11 +87,24 @@ def draw_placement(
     ]
     level = int(np.abs(stack.z - placement.bin_pose[2, 3]).argmin())
     if workspace is not None:
-        draw_level_on(panels[0], stack, level, scale_in, percent_map)
+        # Without numbers, which would vanish under the outlines of the bins.
+        draw_squares(
+            panels[0],
+            stack.x,
+            stack.y,
+            stack.values[level],
+            colours=stack.colours(percent_map),
+            scale=PERCENT_SCALE,
+            font_size=0.0,
+        )
+        for outline in stack.shown(level):
+            draw_outline(panels[0], outline)
         said = f"on the map of path reachability, level {height_text(stack, level)}"
         panels[0].set_title(said, loc="left")
-    marks = _draw_candidates(panels[-1], placement, scale_in, percent_map)
-    panels[-1].set_title("best score at each place, over z and yaw", loc="left")
+    marks = _draw_candidates(panels[-1], placement, percent_map)
+    panels[-1].set_title(
+        "best score at each place over z and yaw; dots: with the bin", loc="left"
+    )
     for outline in stack.shown(level):
         draw_outline(panels[-1], outline)
     handles = _draw_bins(panels[0], placement, context, camera_view)
@@ -240,34 +258,38 @@ def _draw_bin_axis(axes: Axes, placement: BinPlacement) -> None:
 
 
 def _draw_candidates(
-    axes: Axes, placement: BinPlacement, scale_in: float, percent_map: PercentMap
-) -> PathCollection:
-    """Mark each place (x, y) with the best score over the rest of its poses."""
-    places, group = np.unique(
-        placement.candidate_pose[:, :2].round(3), axis=0, return_inverse=True
-    )
-    best = np.full(len(places), -1.0)
-    np.maximum.at(best, group.ravel(), np.nan_to_num(placement.score, nan=-1.0))
+    axes: Axes, placement: BinPlacement, percent_map: PercentMap
+) -> PolyCollection:
+    """Fill each place (x, y) with the best score over the rest of its poses.
+
+    Places that were mapped with the bin in the scene are dots on top.
+    """
+    mapped = placement.exact > 0
+    places, best = _best_at_places(placement, ~mapped if (~mapped).any() else mapped)
     out = best < 0.0
-    axes.plot(
-        places[out, 0],
-        places[out, 1],
-        "x",
-        color="#8c8c8c",
-        markersize=3.5,
-        markeredgewidth=0.9,
+    colours = colour_map(percent_map)
+    marks = PolyCollection(
+        list(_rectangles(places[~out], _spacing(places))),
+        array=best[~out],
+        cmap=colours,
+        norm=PERCENT_SCALE,
+        edgecolors="face",
+        linewidths=0.4,
         zorder=2,
     )
-    marks = axes.scatter(
-        places[~out, 0],
-        places[~out, 1],
-        c=best[~out],
-        s=_mark_size(places) ** 2 * (scale_in * 72.0) ** 2,
-        marker="s",
-        cmap=colour_map(percent_map),
+    axes.add_collection(marks)
+    axes.plot(*places[out].T, "x", color="#8c8c8c", markersize=3.5, zorder=2)
+    places, best = _best_at_places(placement, mapped & ~np.isnan(placement.score))
+    axes.scatter(
+        places[:, 0],
+        places[:, 1],
+        c=best,
+        s=26,
+        cmap=colours,
         norm=PERCENT_SCALE,
-        linewidths=0,
-        zorder=3,
+        edgecolors="white",
+        linewidths=0.9,
+        zorder=4,
     )
     x, y = placement.bin_pose[:2, 3]
     for colour, line in (("white", 4.5), (BIN_COLOUR, 2.2)):
@@ -284,12 +306,29 @@ def _draw_candidates(
     return marks
 
 
-def _mark_size(places: FloatArray) -> float:
-    """Side of a mark that nearly fills the spacing of places [m]."""
-    steps = [np.diff(np.unique(places[:, axis].round(3))) for axis in (0, 1)]
-    # Refined candidates lie between those of the grid: the usual step counts.
-    usual = [float(np.median(step)) for step in steps if step.size]
-    return 0.86 * float(np.clip(min(usual, default=0.05), 0.015, 0.10))
+def _best_at_places(
+    placement: BinPlacement, rows: BoolArray
+) -> tuple[FloatArray, FloatArray]:
+    """Places (n, 2) of some candidates and the best score at each, -1 for none."""
+    places, group = np.unique(
+        placement.candidate_pose[rows, :2].round(4), axis=0, return_inverse=True
+    )
+    best = np.full(len(places), -1.0)
+    np.maximum.at(best, group.ravel(), np.nan_to_num(placement.score[rows], nan=-1.0))
+    return places, best
+
+
+def _spacing(places: FloatArray) -> FloatArray:
+    """Steps in x and y between places, shape (2,) [m]."""
+    steps = [np.diff(np.unique(places[:, axis])) for axis in (0, 1)]
+    usual = [float(np.median(step)) if step.size else 0.05 for step in steps]
+    return np.clip(usual, 0.01, 0.10)
+
+
+def _rectangles(centres: FloatArray, size: FloatArray) -> FloatArray:
+    """Corners of rectangles around centres (n, 2), shape (n, 4, 2) [m]."""
+    corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) / 2
+    return np.asarray(centres[:, None] + size * corners)
 
 
 def _put_legend(figure: Figure, handles: list[Line2D], top: float) -> None:
