@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from reachmap.maps.approximation import ik_approximation
 from reachmap.maps.records import BinMap, WorkspaceMap
 from reachmap.maps.statistics import STATUS_NAMES, Causes, causes_of
 from reachmap.plots.causes import draw_causes
@@ -33,12 +34,24 @@ def cause_section(maps: dict[str, WorkspaceMap | BinMap]) -> Html:
         "causes",
         "Why the rest is not reached",
         paragraph(
-            "A pose with no solution is out of the arm's reach. Where every solution "
+            f"{_no_solution(maps)} Where every solution "
             "collides, the two bodies named stand in the way: a slimmer housing, a "
             "lower wall or another place would free it. Where no path was found, the "
             "pose is free, but planning did not get there with the effort stored below."
         ),
         joined(parts),
+    )
+
+
+def _no_solution(maps: dict[str, WorkspaceMap | BinMap]) -> str:
+    """What "no IK solution" means in these maps."""
+    ways = [ik_approximation(record.provenance.settings) for record in maps.values()]
+    way = next((text for text in ways if text), "")
+    if not way:
+        return "A pose with no IK solution is out of the arm's reach."
+    return (
+        "A pose with no IK solution is most likely out of the arm's reach; inverse "
+        f"kinematics is approximate ({way}) and none was found this way."
     )
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import json
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -68,19 +67,6 @@ class ArtefactInfo:
             "summary": dataclasses.asdict(self.summary),
         }
         return dict(json_ready(facts))
-
-
-def ik_approximation(settings: Mapping[str, Any]) -> str:
-    """How an artefact's inverse kinematics is approximate; "" where it is complete.
-
-    Parameters
-    ----------
-    settings : mapping
-        The settings in the artefact's provenance.
-    """
-    if settings.get("ik_complete", True):
-        return ""
-    return str(settings.get("ik_approximation") or settings.get("ik_method", ""))
 
 
 def info(path: Path) -> ArtefactInfo:

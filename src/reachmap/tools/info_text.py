@@ -7,6 +7,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from reachmap.maps.approximation import ik_approximation
 from reachmap.maps.bin_summary import MEASURES, BinSummary, Spread
 from reachmap.maps.cell_changes import flat_json
 from reachmap.maps.placement_file import is_turn
@@ -19,7 +20,7 @@ from reachmap.maps.workspace_summary import (
     WorkspaceSummary,
 )
 from reachmap.plots.levels import level_names
-from reachmap.tools.info import ArtefactInfo, ik_approximation
+from reachmap.tools.info import ArtefactInfo
 from reachmap.tools.text_table import (
     count_text,
     fact_lines,
