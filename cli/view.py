@@ -42,7 +42,7 @@ def _test_grasp(
     callback=_test_grasp,
     metavar="LAYER,Y,X,ORIENTATION",
     help="Play the path to this test grasp of a bin map, counted from 0. Repeatable "
-    "with --html; by default the shortest path in each quadrant.",
+    "with --html; by default a path of median length in each quadrant.",
 )
 @click.option(
     "--port",

@@ -16,6 +16,7 @@ from reachmap.view.playback import (
     playback_of,
     way_points,
 )
+from reachmap.view.points import shortest_paths
 
 
 @pytest.fixture(scope="module")
@@ -79,6 +80,23 @@ def test_no_joint_is_faster_than_it_can(
         step = np.diff(playback.configuration, axis=0)
         speed = np.abs(step) / np.diff(playback.time_s)[:, None]
         assert (speed <= cell.robot.velocity_rad_s * 1.001).all()
+
+
+def test_the_paths_to_watch_are_typical() -> None:
+    """As many test grasps of the quadrant have a longer shortest path as a shorter."""
+    record = toy_bin_map()
+    shortest = shortest_paths(record)
+    for row in choose_paths(record):
+        _, y, x, _, attempt = record.paths.index[row]
+        place = tuple(record.paths.index[row][:4])
+        assert shortest[place] == row
+        same_y = (record.y >= 0) == (record.y[y] >= 0)
+        same_x = (record.x >= 0) == (record.x[x] >= 0)
+        rows = shortest[:, same_y][:, :, same_x]
+        index = record.paths.index[rows[rows >= 0]]
+        lengths = record.path_length[tuple(index.T)]
+        own = record.path_length[(*place, attempt)]
+        assert abs(int((lengths < own).sum()) - int((lengths > own).sum())) <= 1
 
 
 def test_the_paths_to_watch_are_in_different_quadrants() -> None:

@@ -36,7 +36,8 @@ def page_of(record: Artefact | None, cell: SolidCell, paths: Sequence[int] = ())
     cell : SolidCell
         Of the artefact.
     paths : sequence of int
-        Rows of a bin map's paths to play; the shortest of each quadrant by default.
+        Rows of a bin map's paths to play; by default one of median length in each
+        quadrant.
 
     Raises
     ------

@@ -131,7 +131,10 @@ def _eased(
 
 
 def choose_paths(record: BinMap) -> tuple[int, ...]:
-    """Rows of paths worth watching: the shortest one in each quadrant of the bin."""
+    """Rows of paths worth watching: a typical one in each quadrant of the bin.
+
+    Typical is the median of the lengths; the shortest paths all lead to the middle.
+    """
     rows = shortest_paths(record)
     length = np.full(rows.shape, np.inf)
     has = rows >= 0
@@ -142,9 +145,10 @@ def choose_paths(record: BinMap) -> tuple[int, ...]:
             mask = (record.y >= 0) == north
             inside = mask[None, :, None, None] & ((record.x >= 0) == east)[:, None]
             here = np.where(np.broadcast_to(inside, rows.shape), length, np.inf)
-            best = int(here.argmin())
-            if np.isfinite(here.flat[best]):
-                chosen.append(int(rows.flat[best]))
+            known = int(np.isfinite(here).sum())
+            if known:
+                typical = int(here.argsort(axis=None, kind="stable")[(known - 1) // 2])
+                chosen.append(int(rows.flat[typical]))
     return tuple(dict.fromkeys(chosen))
 
 
