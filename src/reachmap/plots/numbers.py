@@ -14,8 +14,8 @@ from reachmap._typing import FloatArray
 POINTS_PER_INCH = 72.0
 # Size of a digit in units of the font size (DejaVu Sans), without room around it.
 DIGIT_WIDTH, DIGIT_HEIGHT = 0.64, 0.76
-# Room kept between a number and a line, and between it and the edge of its square [pt].
-LINE_ROOM, EDGE_ROOM = 2.6, 1.0
+# Room between a number and a line, and on both axes to the edge of its square [pt].
+LINE_ROOM, EDGE_ROOM = 2.2, np.array([1.0, 3.2])
 
 
 def _effort(step: tuple[float, ...]) -> tuple[float, int]:
@@ -24,7 +24,7 @@ def _effort(step: tuple[float, ...]) -> tuple[float, int]:
 
 
 # Places to try, in parts of the room on either side of the middle.
-STEPS = sorted(product((0.0, 0.5, -0.5, 1.0, -1.0), repeat=2), key=_effort)
+STEPS = sorted(product((0.0, 0.4, -0.4, 0.7, -0.7, 1.0, -1.0), repeat=2), key=_effort)
 
 
 def closed_path(polygon: FloatArray) -> Path:
