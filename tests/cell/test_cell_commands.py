@@ -144,6 +144,34 @@ def test_new_cell_of_a_small_robot_checks_without_edits(tmp_path: Path) -> None:
     assert output.read_text() == text
 
 
+def uncommented(text: str) -> str:
+    """A starter cell whose example camera and bodies are made real."""
+    lines, part = [], ""
+    for line in text.splitlines():
+        if line.startswith("# camera:"):
+            part = "camera"
+        elif line.startswith("bodies: []"):
+            part, line = "bodies", line.replace("[]", "", 1)
+        elif line.startswith("bin:"):
+            part = ""
+        elif part == "bodies":
+            line = line.replace("#", " ", 1)
+        lines.append(line.removeprefix("# ") if part == "camera" else line)
+    return "\n".join(lines) + "\n"
+
+
+def test_the_examples_in_a_starter_cell_work(tmp_path: Path) -> None:
+    """The comments, made real as they say, are a camera, a gripper and a table."""
+    output = tmp_path / "cell.yaml"
+    urdf = "package://example-robot-data/robots/ur_description/urdf/ur3_robot.urdf"
+    assert run("new-cell", urdf, "-o", str(output)).exit_code == 0
+    output.write_text(uncommented(output.read_text()))
+    answer = check(str(output))
+    assert answer.problems == ()
+    assert [body.name for body in answer.bodies][:2] == ["gripper", "table"]
+    assert read_cell(str(output)).cell.camera is not None
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["ur5_robot", "ur10_robot", "panda"])
 def test_new_cell_of_published_arms_checks_without_edits(

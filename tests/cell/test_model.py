@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from pathlib import Path
 
 import jsonschema
 import pytest
@@ -17,6 +18,8 @@ from reachmap.cell.model import Cell
 from reachmap.cell.model_paths import known_keys
 from reachmap.cell.orientations import ConeFamily, ListFamily
 from reachmap.cli import group
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
 
 
 def records(model: type[BaseModel] = Cell) -> Iterator[type[BaseModel]]:
@@ -78,6 +81,17 @@ def test_schema_command_prints_both_schemas() -> None:
         schema = json.loads(result.stdout)
         jsonschema.Draft202012Validator.check_schema(schema)
         assert schema["$id"] == f"reachmap/{name}-1.schema.json"
+
+
+@pytest.mark.parametrize("path", sorted(EXAMPLES.glob("*.json")), ids=lambda p: p.name)
+def test_example_lists_agree_with_the_schema(path: Path) -> None:
+    """The grasp lists that the tutorial ranks are what editors call valid."""
+    schema = json.loads(CliRunner().invoke(group, ["schema", "grasps"]).stdout)
+    validator = jsonschema.Draft202012Validator(schema)
+    document = json.loads(path.read_text())
+    validator.validate(document)
+    del document["grasps"][0]["position"]
+    assert not validator.is_valid(document)
 
 
 def test_known_keys_follow_lists_unions_and_tables() -> None:
