@@ -45,6 +45,11 @@ class PlannerSpec(Record):
     goal_bias: NonNegative | None = Field(
         None, le=1, description="Share of samples taken at a goal, where it has one."
     )
+    projection_cell_rad: Positive | None = Field(
+        1.0,
+        description="Cells that guide a KPIECE planner, over the two joints that move "
+        "the tool furthest [rad]; null: a random projection.",
+    )
     simplification: SimplificationSpec = Field(
         SimplificationSpec(), description="How a found path is shortened."
     )

@@ -198,7 +198,22 @@ class Planner:
             planner.setRange(self.spec.range_rad)
         if self.spec.goal_bias is not None and hasattr(planner, "setGoalBias"):
             planner.setGoalBias(self.spec.goal_bias)
+        if self.spec.projection_cell_rad and hasattr(planner, "setProjectionEvaluator"):
+            planner.setProjectionEvaluator(
+                self._projection(information, self.spec.projection_cell_rad)
+            )
         return planner
+
+    def _projection(self, information: Any, cell_rad: float) -> Any:
+        """Coarse cells over the two joints that move the tool furthest.
+
+        A random projection, as OMPL would take, costs three times the checks, and
+        their number depends on luck rather than on the way to the goal.
+        """
+        joints = np.sort(np.argsort(-self.motions.checker.reach_m, kind="stable")[:2])
+        return ob.RealVectorOrthogonalProjectionEvaluator(
+            information.getStateSpace(), [cell_rad] * len(joints), joints.tolist()
+        )
 
     def _shorten_and_verify(
         self, search: _Search, goals: FloatArray, seed: int
