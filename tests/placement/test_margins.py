@@ -93,6 +93,11 @@ def test_no_score_at_the_pose_itself_is_no_margin():
     assert margins(POSE, Q, lambda pose: True, evaluator) == {}
 
 
+def test_a_score_that_cannot_drop_has_no_margin():
+    """A bin out of reach is not said to have a margin of everything."""
+    assert margins(POSE, Q, lambda pose: True, ClosedForm(lambda pose: 4.0)) == {}
+
+
 @given(limits=st.tuples(*[lengths] * 6, *[angles] * 2))
 def test_what_is_announced_is_enough_and_ever_less(limits):
     """Announced poses never fall short of those that follow; the total never rises."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -70,7 +71,7 @@ class Direct:
         nearest = [self.nearest(turn, R) for R in footprint.R]
         points, shares = [], []
         for p, point in enumerate(footprint.points):
-            at = (turn.apply(point) + [x, y, z])[::-1]
+            at = np.add(turn.apply(point), (x, y, z))[::-1]
             found = share = 0.0
             for o, k in enumerate(nearest):
                 if footprint.open[p, o]:
@@ -256,11 +257,9 @@ def test_cubes_with_different_orientations_are_refused():
     one = synthetic_workspace_map(np.ones((1, 3, 3)), orientations=4)
     two = synthetic_workspace_map(np.ones((1, 3, 3)), orientations=5)
 
-    class Both:
-        cubes = {**one.cubes, "other": two.cubes["all"]}
-
+    both = SimpleNamespace(cubes={**one.cubes, "other": two.cubes["all"]})
     with pytest.raises(MapFileError, match="different orientations"):
-        field_of(Both())
+        field_of(both)
 
 
 def test_linear_weights_add_up_inside_and_vanish_outside():

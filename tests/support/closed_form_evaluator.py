@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from reachmap.placement.evaluator import Evaluation
 from reachmap.placement.exact import ALWAYS, NEVER, PoseScore
-from reachmap.placement.footprint import COARSE
+from reachmap.placement.sample import COARSE
 
 
 class ClosedForm:
@@ -21,24 +21,30 @@ class ClosedForm:
     Attributes
     ----------
     asked : list of pose
-        Every pose that was looked at, in order.
+        Every pose that was looked at, in order; a score is remembered.
+    expected : list of (int, int)
+        What was announced: poses looked at by then, and how many more at most.
     """
 
     def __init__(self, formula):
         self.formula = formula
         self.asked = []
         self.expected = []
+        self._known = {}
 
     def expect(self, poses):
-        """Keep what was announced, with what had been looked at by then."""
+        """Keep what was announced."""
         self.expected.append((len(self.asked), poses))
 
     def evaluate(self, poses, q, *, above=ALWAYS, enough=NEVER, grid=COARSE):
         """Score poses; those not above a score have none."""
         least = above if isinstance(above, list) else [above] * len(poses)
-        return [self._one(p, a) for p, a in zip(poses, least, strict=True)]
+        return [
+            self._known.get((grid, pose)) or self._one(pose, bound, grid)
+            for pose, bound in zip(poses, least, strict=True)
+        ]
 
-    def _one(self, pose, above):
+    def _one(self, pose, above, grid):
         self.asked.append(pose)
         value = self.formula(pose)
         if isinstance(value, str):
@@ -48,4 +54,5 @@ class ClosedForm:
         score = PoseScore(
             score=value, worst_point=value, reachable_share=100.0, path_length_rad=1.0
         )
-        return Evaluation(bound=value, score=score)
+        self._known[grid, pose] = Evaluation(bound=value, score=score)
+        return self._known[grid, pose]

@@ -301,7 +301,7 @@ def _turned(question: Question, starts: list[Candidate]) -> list[Candidate]:
 def _with_turn(pose: Pose, turn_deg: float, question: Question) -> Pose:
     low = float(question.region.low[3])
     yaw = low + (pose[3] + np.radians(turn_deg) - low) % np.pi
-    return (*pose[:3], round(yaw, 9))
+    return (*pose[:3], round(float(yaw), 9))
 
 
 def _nowhere(question: Question, table: CandidateTable) -> str:

@@ -45,11 +45,12 @@ def margins(
     Returns
     -------
     dict
-        ``+x``, ``-x``, … ``-yaw`` to metres or radians.
+        ``+x``, ``-x``, … ``-yaw`` to metres or radians; empty where the score cannot
+        drop that far.
     """
     evaluator.expect(MOST_POSES)
     here = evaluator.evaluate([pose], q, grid=THIN)[0].score
-    if here is None:
+    if here is None or here.score <= DROP_POINTS:
         return {}
     least = here.score - DROP_POINTS
     directions = [(k, sign) for k in range(len(AXES)) for sign in (1.0, -1.0)]

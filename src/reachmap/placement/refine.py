@@ -14,7 +14,8 @@ from reachmap.placement.places import rank_key
 from reachmap.placement.region import AXES, Region
 
 FIRST_STEPS = (0.04, 0.04, 0.04, np.radians(15.0))
-ROUNDS = 2
+ROUNDS = 4
+HALVINGS = 1
 MIN_GAIN_POINTS = 0.25
 MOST_POSES = ROUNDS * 2 * len(AXES)
 
@@ -29,8 +30,9 @@ def refine(
     """Search around a pose, exactly: the best neighbour is the next start.
 
     Neighbours are one step away along one of x, y, z, yaw; when none is better, the
-    step is halved. A neighbour whose bound is less than a quarter of a point above the
-    score is not worth mapping.
+    step is halved, and when again none is, or after four rounds, the search ends. A
+    neighbour whose bound is less than a quarter of a point above the score is not
+    worth mapping.
 
     Parameters
     ----------
@@ -48,7 +50,7 @@ def refine(
     Candidate
         The best that was found, which may be the start.
     """
-    best, steps = start, np.array(FIRST_STEPS)
+    best, steps, halvings = start, np.array(FIRST_STEPS), 0
     for _ in range(ROUNDS):
         poses = [
             pose
@@ -64,7 +66,9 @@ def refine(
         ]
         champion = min([best, *better], key=rank_key)
         if champion is best:
-            steps = steps / 2
+            if halvings == HALVINGS:
+                break
+            steps, halvings = steps / 2, halvings + 1
         best = champion
     return best
 

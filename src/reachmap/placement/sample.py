@@ -150,12 +150,17 @@ def spread_indices(count: int, wanted: int) -> tuple[IntArray, FloatArray]:
     """
     if count <= max(wanted, 2):
         return np.arange(count), np.full(count, 1.0 / count)
-    inner = np.array_split(np.arange(1, count - 1), max(wanted - 2, 1))
-    middle = (count - 1) / 2
-    index = [
+    inner, parts = count - 2, max(wanted - 2, 1)
+    cuts = inner * np.arange(parts + 1) / parts
+    # Rounded the same way from both walls.
+    rounded = np.floor(np.minimum(cuts, inner - cuts) + 0.5)
+    ends = np.where(cuts <= inner / 2, rounded, inner - rounded).astype(int)
+    middle = 1 + (ends[:-1] + ends[1:] - 1) / 2
+    index = np.where(
         # Between two, the one nearer to the wall.
-        int(np.floor(part.mean()) if part.mean() <= middle else np.ceil(part.mean()))
-        for part in inner
-    ]
-    sizes = [1, *(len(part) for part in inner), 1]
+        middle <= (count - 1) / 2,
+        np.floor(middle),
+        np.ceil(middle),
+    ).astype(int)
+    sizes = [1, *np.diff(ends), 1]
     return np.array([0, *index, count - 1]), np.array(sizes) / count

@@ -37,6 +37,7 @@ def placement_settings() -> dict[str, Any]:
         "places_improved": decision.PLACES_IMPROVED,
         "refine_steps": np.round(refine.FIRST_STEPS, 9).tolist(),
         "refine_rounds": refine.ROUNDS,
+        "refine_halvings": refine.HALVINGS,
         "refine_min_gain_points": refine.MIN_GAIN_POINTS,
         "margin_points": margins.DROP_POINTS,
         "margin_shifts_m": list(margins.SHIFTS_M),

@@ -1,0 +1,122 @@
+"""Can the bin stand: contacts, against boxes written out by hand."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scenes import scene_of
+
+from reachmap.core.bin_fit import BinFit
+from reachmap.core.scene import Scene
+from reachmap.errors import SceneError
+from reachmap.geometry import yaw_transform
+
+UR5 = "ur5-eye-in-hand"
+SCENE = scene_of(UR5, with_bin=False)
+FIT = BinFit(SCENE.robot, SCENE.loaded, None)
+
+
+def overlap_of_rectangles(centre, half, yaw, other_half):
+    """Whether a turned rectangle meets one around the origin (separating axes)."""
+    c, s = np.cos(yaw), np.sin(yaw)
+    axes = np.array([[1, 0], [0, 1], [c, s], [-s, c]])
+    turned = np.array([[c, s], [-s, c]]) * np.array(half)[:, None]
+    upright = np.diag(other_half)
+    for axis in axes:
+        reach = np.abs(turned @ axis).sum() + np.abs(upright @ axis).sum()
+        if abs(centre @ axis) >= reach:
+            return False
+    return True
+
+
+@given(
+    x=st.floats(0.2, 0.7),
+    y=st.floats(-0.7, 0.7),
+    z=st.floats(-0.6, -0.05),
+    yaw=st.floats(0, np.pi),
+)
+def test_a_bin_meets_the_pedestal_where_two_rectangles_do(x, y, z, yaw):
+    """Below the pedestal's top the answer is that of two rectangles in the plane."""
+    outer = np.array([0.36, 0.26]) / 2 + 0.006
+    centre = np.array([x, y])
+    wide, narrow = (
+        overlap_of_rectangles(centre, outer + slack, yaw, (0.275, 0.275))
+        for slack in (2e-4, -2e-4)
+    )
+    contact = FIT.contact(yaw_transform(x, y, z, yaw))
+    met = contact is not None and contact.other == "pedestal"
+    assert met or not narrow
+    assert wide or not met
+
+
+def test_the_bin_may_stand_on_something():
+    """A bin whose bottom lies on the pedestal's top touches nothing."""
+    top = -0.002
+    # Turned so that no wall reaches the robot's base.
+    pose = yaw_transform(0.0, 0.4, top + 0.006, 0.0)
+    assert FIT.contact(pose) is None
+    lower = FIT.contact(yaw_transform(0.0, 0.4, top + 0.005, 0.0))
+    assert lower is not None
+    assert lower.pair == "bin bottom touches pedestal"
+    assert lower.reason == "the bin meets pedestal"
+
+
+def test_a_body_inside_the_bin_is_in_the_way():
+    """What stands inside, clear of walls and bottom, is met by the bin itself."""
+    post = (
+        'bodies.pedestal={"name":"post","attach_to":"world",'
+        '"shape":{"box":[0.02,0.02,0.02]},"pose":{"xyz":[0.5,0,0.03]}}'
+    )
+    scene = scene_of(UR5, post, "bodies.floor.touch=[]", with_bin=False)
+    contact = BinFit(scene.robot, scene.loaded, None).contact(
+        yaw_transform(0.5, 0.0, 0.0, 0.3)
+    )
+    assert contact is not None
+    assert contact.pair == "bin touches post"
+    divider = BinFit(scene.robot, scene.loaded, None, empty=False)
+    assert divider.contact(yaw_transform(0.5, 0.0, 0.0, 0.3)) is None
+
+
+def test_the_arm_counts_only_where_its_configuration_is_known():
+    """A bin in the camera housing is refused with the arm, and not without it."""
+    q = SCENE.scan_configuration
+    T_base_tcp = SCENE.kinematics.forward(q)
+    pose = yaw_transform(*T_base_tcp[:3, 3], 0.0)
+    assert FIT.contact(pose) is None
+    contact = BinFit(SCENE.robot, SCENE.loaded, q).contact(pose)
+    assert contact is not None
+    assert contact.at_scan
+    assert contact.pair.endswith("at the scan configuration")
+
+
+@settings(max_examples=10)
+@given(
+    x=st.floats(0.0, 0.7),
+    y=st.floats(-0.5, 0.5),
+    z=st.floats(-0.2, 0.5),
+    yaw=st.floats(0, np.pi),
+)
+def test_the_arm_at_rest_against_the_whole_scene(x, y, z, yaw):
+    """What is said of the arm is what the scene with the bin in it says."""
+    pose = yaw_transform(x, y, z, yaw)
+    contact = BinFit(SCENE.robot, SCENE.loaded, SCENE.scan_configuration).contact(pose)
+    scene = Scene.build(SCENE.loaded.with_changes(bin_pose=pose), with_bin=True)
+    pairs = [
+        scene.checker.body_pairs[k]
+        for k in scene.checker.touching_pairs(scene.scan_configuration)
+    ]
+    if contact is None:
+        assert not pairs
+    elif contact.at_scan:
+        assert any(contact.other in pair and contact.part in pair for pair in pairs)
+
+
+def test_a_scene_refuses_a_bin_in_a_body_that_stands_still():
+    """A bin moved into the pedestal by hand is refused with both names."""
+    scene = scene_of(UR5, "bin.pose.xyz=[0.25,0.3,-0.1]")
+    with pytest.raises(SceneError, match=r"bin\.pose: bin .* touches pedestal"):
+        scene.require_free_scan_configuration()
+    allowed = scene_of(UR5, "bin.pose.xyz=[0.25,0.3,-0.1]", "bin.touch=[pedestal]")
+    allowed.require_free_scan_configuration()

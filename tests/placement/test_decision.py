@@ -1,0 +1,161 @@
+"""The search with a formula for a score: what it finds, and what it refuses."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from closed_form_evaluator import ClosedForm
+from scenes import scene_of
+from synthetic_maps import synthetic_workspace_map
+
+from reachmap.core.bin_fit import BinFit
+from reachmap.errors import SceneError
+from reachmap.placement.decision import (
+    Question,
+    decide_as_given,
+    decide_by_paper,
+    decide_by_search,
+    paper_pose,
+)
+from reachmap.placement.outcome import settle
+from reachmap.placement.places import apart_m
+from reachmap.placement.region import Region
+from reachmap.placement.sample import open_frames
+
+UR5 = "ur5-eye-in-hand"
+SCENE = scene_of(UR5, with_bin=False)
+X = np.round(np.arange(0.0, 1.01, 0.1), 9)
+Y = np.round(np.arange(-0.8, 0.81, 0.16), 9)
+
+
+def question(formula, *, low=(0.0, -0.8, 0.0, 0.0), high=(1.0, 0.8, 0.1, np.pi)):
+    """A question on the UR5 cell whose poses are scored by a formula."""
+    x, y = np.meshgrid(X, Y)
+    near = np.clip(1.2 - np.hypot(x - 0.5, y - 0.3), 0.0, 1.0)
+    workspace = synthetic_workspace_map(
+        np.array([near, near]), x=X, y=Y, z=np.array([0.0, 0.1]), orientations=9
+    )
+    return Question(
+        loaded=SCENE.loaded,
+        workspace=workspace,
+        is_open=open_frames(SCENE.robot, SCENE.loaded),
+        region=Region(low=np.array(low), high=np.array(high)),
+        scene=SCENE,
+        keep_scan=True,
+        fit=BinFit(SCENE.robot, SCENE.loaded, None),
+        evaluator=ClosedForm(formula),
+    )
+
+
+def hill(x, y, z, yaw):
+    """A score with one summit, 96 %, that falls off in all directions."""
+
+    def score(pose):
+        turned = (pose[3] - yaw + np.pi / 2) % np.pi - np.pi / 2
+        away = np.array([pose[0] - x, pose[1] - y, pose[2] - z, 0.2 * turned])
+        return float(96.0 - 60.0 * np.linalg.norm(away))
+
+    return score
+
+
+def test_the_search_climbs_to_the_summit():
+    """From the best places of the map the exact search goes to what is really best."""
+    asked = question(hill(0.46, 0.2, 0.05, 0.6))
+    decision = decide_by_search(asked, 5)
+    rows = decision.table.rows
+    best = rows[decision.ranked[0]]
+    assert best.score.score > 92.0
+    tried = [asked.evaluator.formula(pose) for pose in asked.evaluator.asked]
+    assert best.score.score == pytest.approx(max(tried))
+    scores = [rows[k].score.score for k in decision.ranked]
+    assert scores == sorted(scores, reverse=True)
+    assert all(rows[k].exact for k in decision.ranked)
+
+
+def test_the_runner_up_stands_elsewhere():
+    """The runner-up is the best of those half a bin away, not the next step."""
+    asked = question(hill(0.46, 0.2, 0.05, 0.6))
+    decision = decide_by_search(asked, 5)
+    outcome = settle(asked, decision)
+    rows = decision.table.rows
+    chosen, second = rows[outcome.chosen], rows[outcome.runner_up]
+    assert apart_m(chosen.pose, second.pose) >= asked.different_place_m == 0.18
+    for k in decision.ranked:
+        if apart_m(rows[k].pose, chosen.pose) >= 0.18:
+            assert rows[k].score.score <= second.score.score
+
+
+def test_announced_poses_are_never_too_few():
+    """Progress never has to be corrected upwards, and ends at what was looked at."""
+    asked = question(hill(0.46, 0.2, 0.05, 0.6))
+    settle(asked, decide_by_search(asked, 3))
+    evaluator = asked.evaluator
+    totals = [before + more for before, more in evaluator.expected]
+    assert totals == sorted(totals, reverse=True)
+    assert totals[-1] == len(evaluator.asked)
+
+
+def test_fixed_values_stay_fixed():
+    """Neither steps nor turns leave a fixed value or the region."""
+    asked = question(
+        hill(0.9, 0.7, 0.3, 2.0), low=(0.3, -0.2, 0.05, 0.5), high=(0.6, 0.3, 0.05, 0.5)
+    )
+    decide_by_search(asked, 4)
+    poses = np.array(asked.evaluator.asked)
+    assert (poses[:, 2] == 0.05).all()
+    assert np.allclose(poses[:, 3], 0.5)
+    inside = [asked.region.outside(pose) == "" for pose in poses]
+    assert all(inside)
+
+
+def test_a_region_in_the_pedestal_is_a_clear_error():
+    """Where the bin can stand nowhere, the message says what it meets."""
+    low, high = (0.0, -0.1, -0.3, 0.0), (0.2, 0.1, -0.1, np.pi)
+    with pytest.raises(SceneError, match=r"nowhere.*the bin meets pedestal"):
+        decide_by_search(question(hill(0, 0, 0, 0), low=low, high=high), 5)
+
+
+def test_a_region_without_a_scan_configuration_is_a_clear_error():
+    """Where the arm would meet the bin at every pose, the message says so."""
+    asked = question(lambda pose: "bin wall +x | forearm at the scan configuration")
+    with pytest.raises(SceneError, match=r"nowhere.*forearm at the scan config"):
+        decide_by_search(asked, 5)
+    with pytest.raises(SceneError, match=r"nowhere.*forearm at the scan config"):
+        decide_by_paper(asked)
+
+
+def test_the_papers_pose_is_its_point_at_the_cells_own_angle():
+    """The centre of the inner bottom is put on the densest point, turned as before."""
+    asked = question(hill(0.46, 0.2, 0.05, 0.6))
+    pose = paper_pose(asked)
+    level = asked.workspace.path_reachability[0]
+    assert pose[3] == pytest.approx(np.pi / 2)
+    row, column = (
+        int(np.argmin(np.abs(axis - value)))
+        for axis, value in ((Y, pose[1]), (X, pose[0]))
+    )
+    assert level[row, column] == 100.0
+    decision = decide_by_paper(asked)
+    assert decision.table.rows[decision.paper].pose == pose
+
+
+def test_a_given_pose_is_scored_beside_the_papers():
+    """The user's pose is row 0 and chosen, the paper's is there to compare."""
+    asked = question(hill(0.46, 0.2, 0.05, 0.6))
+    decision = decide_as_given(asked, (0.5, 0.0, 0.0, 0.0))
+    assert decision.ranked == [0]
+    assert decision.table.rows[0].pose == (0.5, 0.0, 0.0, 0.0)
+    assert decision.table.rows[decision.paper].pose == paper_pose(asked)
+
+
+def test_a_given_pose_in_the_pedestal_names_the_pair():
+    """A pose that cannot be is refused, with the part of the bin and the body."""
+    with pytest.raises(SceneError, match=r"--bin-pose: bin .* touches pedestal"):
+        decide_as_given(question(hill(0, 0, 0, 0)), (0.2, 0.2, -0.1, 0.0))
+
+
+def test_a_given_pose_without_a_start_says_why():
+    """A pose with the arm in the way is refused with the reason."""
+    asked = question(lambda pose: "bin wall +x | forearm at the scan configuration")
+    with pytest.raises(SceneError, match=r"--bin-pose: bin wall \+x \| forearm"):
+        decide_as_given(asked, (0.5, 0.0, 0.0, 0.0))

@@ -1,0 +1,146 @@
+"""What a camera sees of a bin, against a pinhole written out by hand."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pinhole import corners_of, sees
+from scenes import scene_of
+from scipy.spatial.transform import Rotation
+
+from reachmap.cell.loading import read_cell
+from reachmap.placement.exact import PlacedScene
+from reachmap.placement.imaging import can_choose, imaging_configurations
+from reachmap.placement.sample import THIN, open_frames, sample_of
+from reachmap.placement.viewpoints import (
+    NOT_SEEN,
+    camera_poses,
+    picture_corners,
+    seen_from,
+    view_of,
+)
+
+UR5 = "ur5-eye-in-hand"
+CELL = read_cell(UR5).cell
+
+
+def looking_down(height_m, *, x=0.0, y=0.0, roll_deg=0.0):
+    """Pose of a camera that looks straight down."""
+    T = np.eye(4)
+    turn = Rotation.from_euler("z", roll_deg, degrees=True)
+    T[:3, :3] = (turn * Rotation.from_euler("x", 180, degrees=True)).as_matrix()
+    T[:3, 3] = x, y, height_m
+    return T
+
+
+@given(
+    height=st.floats(0.3, 0.8),
+    x=st.floats(-0.3, 0.3),
+    y=st.floats(-0.3, 0.3),
+    roll=st.floats(0, 360),
+    tilt=st.floats(-30, 30),
+)
+def test_what_is_seen_against_a_pinhole(height, x, y, roll, tilt):
+    """Grades say the same as projecting the corners one by one."""
+    cell, camera = CELL, CELL.camera
+    T = looking_down(height, x=x, y=y, roll_deg=roll)
+    T[:3, :3] = Rotation.from_euler("y", tilt, degrees=True).as_matrix() @ T[:3, :3]
+    grade = seen_from(T[None], view_of(cell.bin, cell.bin_scan.layers), camera)[0]
+    inner = corners_of(cell.bin.inner, cell.bin.inner[2])
+    bottom, top = inner[:4], inner[4:]
+    volume = np.vstack([bottom, corners_of(cell.bin.inner, 0.05)[4:]])
+    seen = all(sees(camera, T, p, in_range="along the axis") for p in volume)
+    rim = all(sees(camera, T, p, in_range="") for p in top)
+    near = all(sees(camera, T, p, in_range="at all") for p in volume)
+    if not seen:
+        assert grade == NOT_SEEN
+    else:
+        assert grade == (0 if rim else 2) + (0 if near else 1)
+
+
+def test_camera_poses_look_at_the_bin_from_within_range():
+    """Every candidate has the bin's middle before it, at the wanted distance."""
+    cell = CELL
+    view = view_of(cell.bin, cell.bin_scan.layers)
+    T = camera_poses(view, (0.5, 0.6))
+    assert np.allclose(np.linalg.det(T[:, :3, :3]), 1.0)
+    assert (T[:, 2, 2] < -0.95).all()
+    height = T[:, 2, 3] - 0.025
+    distance = height / -T[:, 2, 2]
+    assert distance.min() == pytest.approx(0.525)
+    assert distance.max() == pytest.approx(0.575)
+    ground = T[:, :2, 3] + distance[:, None] * T[:, :2, 2]
+    assert (np.abs(ground) <= np.array([0.25 * 0.18, 0.25 * 0.13]) + 1e-9).all()
+
+
+def test_a_range_too_short_for_the_bin_still_gives_candidates():
+    """The nearest distance is offered, and judged like the others."""
+    cell = CELL
+    view = view_of(cell.bin, (0.05,))
+    T = camera_poses(view, (0.5, 0.51))
+    assert len(T)
+    grades = seen_from(
+        T, view, read_cell(UR5, ["camera.range_m=[0.5,0.51]"]).cell.camera
+    )
+    assert (grades == NOT_SEEN).all()
+
+
+def test_the_picture_on_a_level_is_the_field_of_view():
+    """Straight down from 0.5 m the picture is 2·0.5·tan(half the angle) wide."""
+    camera = CELL.camera
+    corners = picture_corners(looking_down(0.5, x=0.2), camera, 0.0)
+    size = np.ptp(corners, axis=0)
+    wanted = 2 * 0.5 * np.tan(np.radians(camera.field_of_view_deg) / 2)
+    assert np.allclose(size, wanted)
+    assert np.allclose(corners.mean(axis=0), [0.2, 0.0])
+    sideways = looking_down(0.5)
+    sideways[:3, :3] = Rotation.from_euler("y", 90, degrees=True).as_matrix()
+    assert picture_corners(sideways, camera, 0.0) is None
+
+
+def placed_ur5(pose, *overrides):
+    """Scene of the UR5 cell with its bin at a pose."""
+    loaded = read_cell(UR5, overrides)
+    robot = scene_of(UR5, with_bin=False).robot
+    sample = sample_of(loaded.cell, THIN, open_frames(robot, loaded))
+    return PlacedScene(loaded, pose, sample)
+
+
+def test_imaging_configurations_see_the_whole_bin_and_are_free():
+    """Each of them projects all inner corners into the picture, within range."""
+    placed = placed_ur5((0.45, 0.1, 0.02, 1.2))
+    scene, camera = placed.scene, placed.scene.loaded.cell.camera
+    T_flange_camera = np.eye(4)
+    T_flange_camera[:3, 3] = camera.xyz
+    T_tcp_flange = np.eye(4)
+    T_tcp_flange[2, 3] = -0.275
+    found = list(imaging_configurations(placed))
+    assert len(found) >= 4
+    inner = scene.loaded.cell.bin.inner
+    corners = corners_of(inner, inner[2]) @ scene.T_base_bin[:3, :3].T
+    corners = corners + scene.T_base_bin[:3, 3]
+    for k, q in enumerate(found):
+        T = scene.kinematics.forward(q) @ T_tcp_flange @ T_flange_camera
+        assert all(sees(camera, T, p, in_range="along the axis") for p in corners)
+        assert scene.checker.is_free(q)
+        assert all(np.linalg.norm(q - other) >= 0.4 for other in found[:k])
+
+
+def test_something_in_the_line_of_sight_leaves_no_configuration():
+    """A plate above the bin that the arm need not touch hides it from everywhere."""
+    plate = (
+        'bodies.pedestal={"name":"pedestal","attach_to":"world",'
+        '"shape":{"box":[0.5,0.5,0.002]},"pose":{"xyz":[0.45,0,0.12]}}'
+    )
+    placed = placed_ur5((0.45, 0.0, 0.0, 1.57), plate)
+    assert next(imaging_configurations(placed), None) is None
+
+
+def test_a_cell_without_a_camera_on_its_tool_keeps_its_configuration():
+    """Only a camera that moves with the tool gives a choice."""
+    assert can_choose(scene_of(UR5, with_bin=False))
+    assert not can_choose(scene_of("planar-toy", with_bin=False))
+    fixed = ("camera.parent=world", "camera.xyz=[0.5,0,1.0]")
+    assert not can_choose(scene_of(UR5, *fixed, with_bin=False))
