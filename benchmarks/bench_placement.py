@@ -21,6 +21,7 @@ from reachmap._typing import FloatArray
 from reachmap.cell.loading import LoadedCell
 from reachmap.core.bin_fit import BinFit
 from reachmap.core.robot import RobotModel
+from reachmap.core.scene import Scene
 from reachmap.geometry import yaw_transform
 from reachmap.maps import BinPlacement, Status, read_placement, read_workspace_map
 from reachmap.placement.evaluator import Evaluation, open_evaluator
@@ -54,9 +55,10 @@ def entries(
     """Chosen pose, the paper's choice, and random feasible poses."""
     robot = RobotModel.from_cell(loaded)
     sample = sample_of(loaded.cell, THIN, open_frames(robot, loaded))
+    scene = Scene.build(loaded, with_bin=True, bin_moves=True)
 
     def imaged_from(pose: Pose) -> FloatArray | None:
-        placed = PlacedScene(loaded, pose, sample)
+        placed = PlacedScene(scene, pose, sample)
         return next(imaging_configurations(placed), None)
 
     chosen, paper = (

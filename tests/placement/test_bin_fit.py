@@ -120,3 +120,24 @@ def test_a_scene_refuses_a_bin_in_a_body_that_stands_still():
         scene.require_free_scan_configuration()
     allowed = scene_of(UR5, "bin.pose.xyz=[0.25,0.3,-0.1]", "bin.touch=[pedestal]")
     allowed.require_free_scan_configuration()
+
+
+def test_a_moved_bin_is_checked_like_one_that_was_built_there():
+    """Configurations and pairs are judged as in a scene that was built anew."""
+    rng = np.random.default_rng(11)
+    moving = Scene.build(SCENE.loaded, with_bin=True, bin_moves=True)
+    for pose in ((0.5, 0.1, -0.1, 0.4), (0.3, -0.3, 0.3, 1.2)):
+        loaded = SCENE.loaded.with_changes(bin_pose=yaw_transform(*pose))
+        moving, built = moving.with_bin_of(loaded), Scene.build(loaded, with_bin=True)
+        assert np.allclose(moving.T_base_bin, built.T_base_bin)
+        assert set(built.checker.body_pairs) <= set(moving.checker.body_pairs)
+        hits = 0
+        for q in rng.uniform(-2.5, 2.5, (300, 6)):
+            one, two = (
+                {scene.checker.body_pairs[k] for k in scene.checker.touching_pairs(q)}
+                for scene in (moving, built)
+            )
+            assert one == two
+            assert moving.checker.is_free(q) == built.checker.is_free(q)
+            hits += any("bin" in pair for pair in one)
+        assert hits > 3

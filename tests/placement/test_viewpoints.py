@@ -11,6 +11,7 @@ from scenes import scene_of
 from scipy.spatial.transform import Rotation
 
 from reachmap.cell.loading import read_cell
+from reachmap.core.scene import Scene
 from reachmap.placement.exact import PlacedScene
 from reachmap.placement.imaging import can_choose, imaging_configurations
 from reachmap.placement.sample import THIN, open_frames, sample_of
@@ -103,9 +104,9 @@ def test_the_picture_on_a_level_is_the_field_of_view():
 def placed_ur5(pose, *overrides):
     """Scene of the UR5 cell with its bin at a pose."""
     loaded = read_cell(UR5, overrides)
-    robot = scene_of(UR5, with_bin=False).robot
-    sample = sample_of(loaded.cell, THIN, open_frames(robot, loaded))
-    return PlacedScene(loaded, pose, sample)
+    scene = Scene.build(loaded, with_bin=True, bin_moves=True)
+    sample = sample_of(loaded.cell, THIN, open_frames(scene.robot, loaded))
+    return PlacedScene(scene, pose, sample)
 
 
 def test_imaging_configurations_see_the_whole_bin_and_are_free():

@@ -84,6 +84,17 @@ def bin_boxes(spec: BinSpec) -> tuple[BinBox, ...]:
     return tuple(BinBox(name=n, size_m=s, centre_m=c) for n, s, c in (floor, *walls))
 
 
+def bin_placements(robot: RobotModel, spec: BinSpec) -> dict[str, FloatArray]:
+    """Poses (4, 4) of the bin's boxes in the model's root frame, by name."""
+    T_root_bin = robot.T_root_base @ spec.pose.matrix()
+    return {
+        box.name: np.asarray(
+            T_root_bin @ transform_from_parts(np.eye(3), np.array(box.centre_m))
+        )
+        for box in bin_boxes(spec)
+    }
+
+
 def build_geometry(
     robot: RobotModel, loaded: LoadedCell, *, with_bin: bool
 ) -> BodyGeometry:
@@ -109,12 +120,9 @@ def build_geometry(
         shape = coal_shape(body.shape, loaded, body.name)
         builder.add(body.name, joint, T_joint_frame @ body.pose.matrix(), shape)
     if with_bin:
-        T_root_bin = robot.T_root_base @ loaded.cell.bin.pose.matrix()
+        placements = bin_placements(robot, loaded.cell.bin)
         for box in bin_boxes(loaded.cell.bin):
-            placement = T_root_bin @ transform_from_parts(
-                np.eye(3), np.array(box.centre_m)
-            )
-            builder.add(box.name, ROOT, placement, coal.Box(*box.size_m))
+            builder.add(box.name, ROOT, placements[box.name], coal.Box(*box.size_m))
     touches = [(body.name, body.touch) for body in loaded.cell.bodies]
     if with_bin:
         touches.append(("bin", loaded.cell.bin.touch))

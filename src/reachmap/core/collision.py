@@ -8,6 +8,7 @@ which is how :mod:`reachmap.core.motion` proves whole motions free.
 
 from __future__ import annotations
 
+from collections.abc import Collection, Mapping
 from typing import TYPE_CHECKING, Any
 
 import coal
@@ -38,6 +39,8 @@ class CollisionChecker:
         Pairs that can never meet are removed from it.
     safety_margin_m : float
         Bodies closer than this count as touching.
+    movable : collection of str
+        Bodies that stand still and may be moved; nothing is proved about them.
 
     Attributes
     ----------
@@ -54,15 +57,25 @@ class CollisionChecker:
     """
 
     def __init__(
-        self, robot: RobotModel, bodies: BodyGeometry, safety_margin_m: float
+        self,
+        robot: RobotModel,
+        bodies: BodyGeometry,
+        safety_margin_m: float,
+        *,
+        movable: Collection[str] = (),
     ) -> None:
         self._model = robot.model
         self._geometry = bodies.geometry
+        self._movable = {n: k for k, n in enumerate(bodies.names) if n in movable}
         self.safety_margin_m = safety_margin_m
         bounds = displacement_bounds(robot.model, bodies.geometry)
         self._hulls = _with_convex_hulls(bodies.geometry)
         proved = pairs_that_never_meet(
-            robot.model, self._hulls, bounds, safety_margin_m
+            robot.model,
+            self._hulls,
+            bounds,
+            safety_margin_m,
+            left_out=frozenset(self._movable.values()),
         )
         for first, second in proved:
             pair = pin.CollisionPair(first, second)
@@ -104,6 +117,14 @@ class CollisionChecker:
             )
             for step in LADDER_M
         ]
+
+    def move(self, T_root_body: Mapping[str, FloatArray]) -> None:
+        """Put movable bodies elsewhere, by name and pose (4, 4); see :meth:`reset`."""
+        for name, T in T_root_body.items():
+            placement = pin.SE3(np.ascontiguousarray(T))
+            for geometry in (self._geometry, self._hulls):
+                geometry.geometryObjects[self._movable[name]].placement = placement
+        self.reset()
 
     def _broadphase_with(self, geometry: Any, margins: FloatArray) -> tuple[Any, Any]:
         data = geometry.createData()

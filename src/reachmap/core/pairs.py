@@ -21,7 +21,12 @@ MAX_BOXES = 3000
 
 
 def pairs_that_never_meet(
-    model: Any, hulls: Any, bounds: FloatArray, margin_m: float
+    model: Any,
+    hulls: Any,
+    bounds: FloatArray,
+    margin_m: float,
+    *,
+    left_out: frozenset[int] = frozenset(),
 ) -> tuple[tuple[int, int], ...]:
     """Find the collision pairs that are proved to stay apart.
 
@@ -35,6 +40,8 @@ def pairs_that_never_meet(
         See :func:`reachmap.core.displacement.displacement_bounds`.
     margin_m : float
         The pair stays further apart than this.
+    left_out : frozenset of int
+        Geometry indices of bodies that nothing is proved about.
 
     Returns
     -------
@@ -45,7 +52,7 @@ def pairs_that_never_meet(
     return tuple(
         (pair.first, pair.second)
         for index, pair in enumerate(hulls.collisionPairs)
-        if prover.never_meets(index)
+        if not left_out & {pair.first, pair.second} and prover.never_meets(index)
     )
 
 

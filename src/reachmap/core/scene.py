@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -9,7 +10,7 @@ import numpy as np
 
 from reachmap._typing import FloatArray
 from reachmap.core.bin_fit import BinFit
-from reachmap.core.bodies import build_geometry
+from reachmap.core.bodies import bin_placements, build_geometry
 from reachmap.core.collision import CollisionChecker
 from reachmap.core.kinematics import Kinematics
 from reachmap.core.motion import MotionChecker
@@ -51,8 +52,17 @@ class Scene:
     with_bin: bool
 
     @classmethod
-    def build(cls, loaded: LoadedCell, *, with_bin: bool = True) -> Scene:
+    def build(
+        cls, loaded: LoadedCell, *, with_bin: bool = True, bin_moves: bool = False
+    ) -> Scene:
         """Assemble a scene.
+
+        Parameters
+        ----------
+        loaded : LoadedCell
+        with_bin : bool
+        bin_moves : bool
+            Whether :meth:`with_bin_of` will be used.
 
         Raises
         ------
@@ -62,7 +72,12 @@ class Scene:
         cell = loaded.cell
         robot = RobotModel.from_cell(loaded)
         bodies = build_geometry(robot, loaded, with_bin=with_bin)
-        checker = CollisionChecker(robot, bodies, cell.collision.safety_margin_m)
+        checker = CollisionChecker(
+            robot,
+            bodies,
+            cell.collision.safety_margin_m,
+            movable=bin_placements(robot, cell.bin) if bin_moves else (),
+        )
         motions = MotionChecker(
             checker,
             cell.collision.planning_step_rad,
@@ -81,6 +96,22 @@ class Scene:
             T_base_bin=cell.bin.pose.matrix(),
             with_bin=with_bin,
         )
+
+    def with_bin_of(self, loaded: LoadedCell) -> Scene:
+        """Move the bin to where a version of the cell has it.
+
+        That takes a fraction of the time of building a scene. Everything else is
+        shared: the scene that this is called on, built with ``bin_moves``, must not be
+        used any more.
+
+        Parameters
+        ----------
+        loaded : LoadedCell
+            The same cell but for the bin's pose.
+        """
+        self.checker.move(bin_placements(self.robot, loaded.cell.bin))
+        T_base_bin = loaded.cell.bin.pose.matrix()
+        return dataclasses.replace(self, loaded=loaded, T_base_bin=T_base_bin)
 
     def require_free_scan_configuration(self) -> None:
         """Refuse to work from a scan configuration that cannot be taken.

@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import json
 import secrets
-from collections import OrderedDict
 from collections.abc import Iterator, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
@@ -14,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from reachmap._typing import BoolArray, FloatArray
+from reachmap.core.scene import Scene
 from reachmap.errors import EngineError
 from reachmap.placement.exact import ALWAYS, NEVER, PlacedScene, Pose, PoseScore
 from reachmap.placement.imaging import UNSEEN, imaging_configurations
@@ -28,8 +28,6 @@ from reachmap.scans.work import one_frame
 
 if TYPE_CHECKING:
     from reachmap.cell.loading import LoadedCell
-
-SCENES_KEPT = 2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -177,7 +175,7 @@ def open_evaluator(
 
 
 class Prepared:
-    """A worker's scenes; the last few are kept.
+    """A worker's scene, with the bin where it was last wanted.
 
     Parameters
     ----------
@@ -186,21 +184,21 @@ class Prepared:
     """
 
     def __init__(self, context: tuple[LoadedCell, BoolArray]) -> None:
-        self.loaded, self.is_open = context
+        loaded, self._is_open = context
+        self._scene = Scene.build(loaded, with_bin=True, bin_moves=True)
         self._samples: dict[Grid, Sample] = {}
-        self._scenes: OrderedDict[tuple[Grid, Pose], PlacedScene] = OrderedDict()
+        self._at: tuple[Grid, Pose] | None = None
+        self._placed: PlacedScene | None = None
 
     def scene_at(self, pose: Pose, grid: Grid) -> PlacedScene:
         """Scene with the bin at a pose."""
-        if grid not in self._samples:
-            self._samples[grid] = sample_of(self.loaded.cell, grid, self.is_open)
-        key = (grid, pose)
-        if key not in self._scenes:
-            self._scenes[key] = PlacedScene(self.loaded, pose, self._samples[grid])
-        self._scenes.move_to_end(key)
-        while len(self._scenes) > SCENES_KEPT:
-            self._scenes.popitem(last=False)
-        return self._scenes[key]
+        if self._placed is None or self._at != (grid, pose):
+            if grid not in self._samples:
+                cell = self._scene.loaded.cell
+                self._samples[grid] = sample_of(cell, grid, self._is_open)
+            self._placed = PlacedScene(self._scene, pose, self._samples[grid])
+            self._at = (grid, pose)
+        return self._placed
 
 
 def evaluate_unit(prepared: Prepared, unit: int) -> dict[str, Any]:

@@ -8,7 +8,6 @@ reached.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,9 +18,6 @@ from reachmap.core.planning import Planner
 from reachmap.core.scene import Scene
 from reachmap.geometry import yaw_transform
 from reachmap.placement.sample import Sample
-
-if TYPE_CHECKING:
-    from reachmap.cell.loading import LoadedCell
 
 ATTEMPTS = 1
 ALWAYS = -1.0
@@ -58,7 +54,8 @@ class PlacedScene:
 
     Parameters
     ----------
-    loaded : LoadedCell
+    scene : Scene
+        With a bin that can be moved; must not be used by anybody else meanwhile.
     pose : (x, y, z [m], yaw [rad])
     sample : Sample
 
@@ -75,10 +72,10 @@ class PlacedScene:
         Frame of each, rising.
     """
 
-    def __init__(self, loaded: LoadedCell, pose: Pose, sample: Sample) -> None:
-        changed = loaded.with_changes(bin_pose=yaw_transform(*pose))
+    def __init__(self, scene: Scene, pose: Pose, sample: Sample) -> None:
+        changed = scene.loaded.with_changes(bin_pose=yaw_transform(*pose))
         self.pose = pose
-        self.scene = Scene.build(changed, with_bin=True)
+        self.scene = scene.with_bin_of(changed)
         cell = changed.cell
         self.T = self.scene.T_base_bin @ sample.T_bin_tcp
         self._sample = sample
@@ -93,7 +90,6 @@ class PlacedScene:
 
     def _survey(self) -> None:
         scene = self.scene
-        scene.checker.reset()
         Q, frame = scene.kinematics.solve_many(self.T, windings=False)
         self._has_ik = np.bincount(frame, minlength=len(self.T)) > 0
         free = scene.checker.free_mask(Q)

@@ -9,6 +9,7 @@ import numpy as np
 
 from reachmap._typing import FloatArray
 from reachmap.core.bin_fit import BinFit
+from reachmap.core.scene import Scene
 from reachmap.errors import SceneError
 from reachmap.geometry import yaw_transform
 from reachmap.placement.candidates import Candidate
@@ -91,7 +92,8 @@ def settle(
 def _scan(question: Question, candidate: Candidate) -> ScanChoice | None:
     if not question.keep_scan:
         sample = sample_of(question.loaded.cell, THIN, question.is_open)
-        placed = PlacedScene(question.loaded, candidate.pose, sample)
+        scene = Scene.build(question.loaded, with_bin=True, bin_moves=True)
+        placed = PlacedScene(scene, candidate.pose, sample)
         return choose_scan(placed, question.evaluator)
     assert candidate.score is not None
     q: FloatArray = np.array(question.scene.scan_configuration)
