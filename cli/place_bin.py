@@ -201,6 +201,9 @@ def _lines(placement: BinPlacement, output: Path, top: int) -> Iterator[str]:
     facts = placement_facts(placement)
     if placement.margin:
         yield "margin (score within 5 points): " + _margin_text(facts)
+    limit = facts["tool_limit_percent"]
+    if limit is not None and limit < 100:
+        yield f"no pose can score more than {limit:.1f}%: the tool itself meets the bin"
     yield (
         f"{facts['candidates']} poses considered, {facts['mapped_with_bin']} mapped "
         f"with the bin in the scene, {facts['excluded']} excluded"

@@ -152,6 +152,9 @@ def test_options_and_table_agree_with_the_file(ur5):
     assert f"{best:.1f}%" in chosen
     assert 2 <= len(pose_rows(lines)) <= 4
     assert any(line.startswith("margin") and "+yaw" in line for line in lines)
+    limit = placement.provenance.settings["placement"]["tool_limit_percent"]
+    assert f"no pose can score more than {limit:.1f}%" in "\n".join(lines)
+    assert best <= limit + 0.01 < 100.0
 
 
 def test_bin_scan_goes_on_from_the_placement_alone(ur5, tmp_path):

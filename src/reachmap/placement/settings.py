@@ -48,6 +48,7 @@ def placement_settings() -> dict[str, Any]:
             "azimuths": viewpoints.AZIMUTHS,
             "roll_step_deg": viewpoints.ROLL_STEP_DEG,
             "offsets": list(viewpoints.OFFSETS),
+            "border": viewpoints.BORDER,
             "finalists": scan_choice.FINALISTS,
             "apart_rad": imaging.APART_RAD,
             "equal_points": scan_choice.EQUAL_POINTS,

@@ -16,7 +16,8 @@ def placement_facts(placement: BinPlacement) -> dict[str, Any]:
     -------
     dict
         ``rule``, ``chosen``, ``runner_up``, ``paper`` (rows, or None), ``margin``,
-        ``scan_configuration``, counts of candidates.
+        ``scan_configuration``, counts of candidates, and ``tool_limit_percent``, the
+        share of test grasps that the tool itself can take in this bin.
     """
     excluded = sum(1 for reason in placement.reason if reason)
     return {
@@ -41,6 +42,9 @@ def placement_facts(placement: BinPlacement) -> dict[str, Any]:
         "candidates": len(placement.reason),
         "mapped_with_bin": int((placement.exact > 0).sum()),
         "excluded": excluded,
+        "tool_limit_percent": placement.provenance.settings.get("placement", {}).get(
+            "tool_limit_percent"
+        ),
     }
 
 

@@ -16,6 +16,8 @@ TILTS_DEG = (0.0, 8.0, 16.0)
 AZIMUTHS = 8
 ROLL_STEP_DEG = 5.0
 OFFSETS = (-0.25, 0.0, 0.25)
+# Share of the half picture at each edge that is better left free.
+BORDER = 0.05
 NOT_SEEN = 9
 SLACK_M = 1e-9
 
@@ -79,9 +81,10 @@ def seen_from(T_bin_camera: FloatArray, view: View, camera: CameraSpec) -> IntAr
     Returns
     -------
     int array
-        0: the rim is in the picture too, and every corner of the pick volume is in
-        range along its line of sight as well as along the optical axis. 1: the rim,
-        and in range along the axis. 2 and 3: the same without the rim.
+        0: the rim is in the picture too, with a border around it, and every corner of
+        the pick volume is in range along its line of sight as well as along the
+        optical axis. 1: the same, in range along the axis only. 2 and 3: the same
+        without the border. 4 and 5: without the rim.
         :data:`NOT_SEEN`: the pick volume is not in the picture or not in range.
     """
     T_camera_bin = inverse_transform(T_bin_camera)
@@ -93,9 +96,10 @@ def seen_from(T_bin_camera: FloatArray, view: View, camera: CameraSpec) -> IntAr
     near_enough = np.asarray((depth <= far + SLACK_M).all(axis=1), bool)
     far_enough = np.asarray((depth >= near - SLACK_M).all(axis=1), bool)
     usable = _in_picture(volume, camera) & near_enough & far_enough
-    no_rim = (~_in_picture(rim, camera)).astype(int)
+    bordered, whole = (_in_picture(rim, camera, part) for part in (1.0 - BORDER, 1.0))
+    rim_missing = 2 - bordered.astype(int) - whole.astype(int)
     too_far = np.asarray((sight > far + SLACK_M).any(axis=1), int)
-    return np.where(usable, 2 * no_rim + too_far, NOT_SEEN)
+    return np.where(usable, 2 * rim_missing + too_far, NOT_SEEN)
 
 
 def picture_corners(
@@ -121,9 +125,12 @@ def _in_camera(T_camera_bin: FloatArray, points: FloatArray) -> FloatArray:
     return np.asarray(points @ np.swapaxes(R, 1, 2) + p[:, None])
 
 
-def _in_picture(points: FloatArray, camera: CameraSpec) -> BoolArray:
-    """Whether all points (n, m, 3) in camera frames are in the picture, (n,)."""
-    slope = np.tan(np.radians(camera.field_of_view_deg) / 2)
+def _in_picture(points: FloatArray, camera: CameraSpec, part: float = 1.0) -> BoolArray:
+    """Whether all points (n, m, 3) in camera frames are in the picture, (n,).
+
+    ``part`` leaves the edges of the picture out.
+    """
+    slope = part * np.tan(np.radians(camera.field_of_view_deg) / 2)
     depth = points[..., 2]
     inside = np.abs(points[..., :2]) <= slope * depth[..., None]
     return np.asarray((inside.all(axis=-1) & (depth > 0)).all(axis=1), bool)

@@ -251,6 +251,7 @@ def _record(
                 "limits": {k: list(v) for k, v in choice.limits.items()},
                 "fixed": dict(choice.fixed),
                 "scan_configuration": "new" if outcome.scan.is_new else "kept",
+                "tool_limit_percent": round(100 * float(question.is_open.mean()), 2),
             },
         },
         source_sha256=question.workspace.stamp.content_sha256,
