@@ -39,6 +39,13 @@ def command(output, *options, **toy):
 def start(output, *options, limit=None, **toy):
     """Start a toy scan in a session of its own."""
     environment = {**os.environ, "PYTHONPATH": str(SCRIPT.parent)}
+
+    def before_start():
+        # A shell starts what it runs in the background with Ctrl-C ignored.
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
+        if limit is not None:
+            limit()
+
     return subprocess.Popen(
         command(output, *options, **toy),
         env=environment,
@@ -46,7 +53,7 @@ def start(output, *options, limit=None, **toy):
         stderr=subprocess.PIPE,
         text=True,
         start_new_session=True,
-        preexec_fn=limit,
+        preexec_fn=before_start,
     )
 
 
