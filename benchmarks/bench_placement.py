@@ -59,7 +59,8 @@ def entries(
 
     def imaged_from(pose: Pose) -> FloatArray | None:
         placed = PlacedScene(scene, pose, sample)
-        return next(imaging_configurations(placed), None)
+        found = imaging_configurations(placed.scene, placed.Q, placed.frame)
+        return next(found, None)
 
     chosen, paper = (
         _pose(placement.candidate_pose[k])

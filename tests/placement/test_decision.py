@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 from closed_form_evaluator import ClosedForm
@@ -9,26 +11,30 @@ from scenes import scene_of
 from synthetic_maps import synthetic_workspace_map
 
 from reachmap.core.bin_fit import BinFit
+from reachmap.core.scene import Scene
 from reachmap.errors import SceneError
-from reachmap.placement.decision import (
-    Question,
-    decide_as_given,
-    decide_by_paper,
-    decide_by_search,
-    paper_pose,
-)
+from reachmap.placement.decision import decide_as_given, decide_by_paper, paper_pose
 from reachmap.placement.outcome import settle
 from reachmap.placement.places import apart_m
+from reachmap.placement.question import Question
 from reachmap.placement.region import Region
 from reachmap.placement.sample import open_frames
+from reachmap.placement.search import decide_by_search
 
 UR5 = "ur5-eye-in-hand"
 SCENE = scene_of(UR5, with_bin=False)
+MOVING = Scene.build(SCENE.loaded, with_bin=True, bin_moves=True)
 X = np.round(np.arange(0.0, 1.01, 0.1), 9)
 Y = np.round(np.arange(-0.8, 0.81, 0.16), 9)
 
 
-def question(formula, *, low=(0.0, -0.8, 0.0, 0.0), high=(1.0, 0.8, 0.1, np.pi)):
+def question(
+    formula,
+    *,
+    low=(0.0, -0.8, 0.0, 0.0),
+    high=(1.0, 0.8, 0.1, np.pi),
+    keep_scan=True,
+):
     """A question on the UR5 cell whose poses are scored by a formula."""
     x, y = np.meshgrid(X, Y)
     near = np.clip(1.2 - np.hypot(x - 0.5, y - 0.3), 0.0, 1.0)
@@ -41,7 +47,8 @@ def question(formula, *, low=(0.0, -0.8, 0.0, 0.0), high=(1.0, 0.8, 0.1, np.pi))
         is_open=open_frames(SCENE.robot, SCENE.loaded),
         region=Region(low=np.array(low), high=np.array(high)),
         scene=SCENE,
-        keep_scan=True,
+        moving=MOVING,
+        keep_scan=keep_scan,
         fit=BinFit(SCENE.robot, SCENE.loaded, None),
         evaluator=ClosedForm(formula),
     )
@@ -159,3 +166,36 @@ def test_a_given_pose_without_a_start_says_why():
     asked = question(lambda pose: "bin wall +x | forearm at the scan configuration")
     with pytest.raises(SceneError, match=r"--bin-pose: bin wall \+x \| forearm"):
         decide_as_given(asked, (0.5, 0.0, 0.0, 0.0))
+
+
+def test_places_that_cannot_be_imaged_are_passed_over():
+    """High places, where the camera cannot get above the bin, are excluded as such."""
+    asked = question(
+        lambda pose: 60.0 + 30.0 * pose[2],
+        low=(0.2, -0.6, 0.0, 0.0),
+        high=(0.8, 0.6, 0.7, 0.0),
+        keep_scan=False,
+    )
+    share = np.full((3, len(Y), len(X)), 0.6)
+    share[2] = 0.0
+    share[2, 4:7, 4:8] = 1.0
+    workspace = synthetic_workspace_map(share, x=X, y=Y, z=np.array([0.0, 0.3, 0.7]))
+    asked = dataclasses.replace(asked, workspace=workspace)
+    decision = decide_by_search(asked, 2)
+    reasons = decision.table.reasons()
+    assert "no scan configuration images the bin" in reasons
+    mapped = [decision.table.rows[k].pose for k in decision.ranked]
+    assert any(asked.can_be_imaged(pose) for pose in mapped)
+    assert min(pose[2] for pose in mapped) < 0.3
+
+
+def test_a_bin_too_high_for_the_camera_is_a_clear_error():
+    """Where no place can be imaged, the message says so and what to look at."""
+    asked = question(
+        lambda pose: 90.0,
+        low=(0.4, 0.0, 0.9, 0.0),
+        high=(0.6, 0.1, 0.9, 0.0),
+        keep_scan=False,
+    )
+    with pytest.raises(SceneError, match=r"no scan config.*places; look elsewhere"):
+        decide_by_search(asked, 2)

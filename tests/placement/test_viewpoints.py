@@ -48,7 +48,7 @@ def test_what_is_seen_against_a_pinhole(height, x, y, roll, tilt):
     cell, camera = CELL, CELL.camera
     T = looking_down(height, x=x, y=y, roll_deg=roll)
     T[:3, :3] = Rotation.from_euler("y", tilt, degrees=True).as_matrix() @ T[:3, :3]
-    grade = seen_from(T[None], view_of(cell.bin, cell.bin_scan.layers), camera)[0]
+    grade = seen_from(T[None], view_of(cell.bin.inner, cell.bin_scan.layers), camera)[0]
     inner = corners_of(cell.bin.inner, cell.bin.inner[2])
     bottom, top = inner[:4], inner[4:]
     volume = np.vstack([bottom, corners_of(cell.bin.inner, 0.05)[4:]])
@@ -66,7 +66,7 @@ def test_what_is_seen_against_a_pinhole(height, x, y, roll, tilt):
 def test_camera_poses_look_at_the_bin_from_within_range():
     """Every candidate has the bin's middle before it, at the wanted distance."""
     cell = CELL
-    view = view_of(cell.bin, cell.bin_scan.layers)
+    view = view_of(cell.bin.inner, cell.bin_scan.layers)
     T = camera_poses(view, (0.5, 0.6))
     assert np.allclose(np.linalg.det(T[:, :3, :3]), 1.0)
     assert (T[:, 2, 2] < -0.95).all()
@@ -81,7 +81,7 @@ def test_camera_poses_look_at_the_bin_from_within_range():
 def test_a_range_too_short_for_the_bin_still_gives_candidates():
     """The nearest distance is offered, and judged like the others."""
     cell = CELL
-    view = view_of(cell.bin, (0.05,))
+    view = view_of(cell.bin.inner, (0.05,))
     T = camera_poses(view, (0.5, 0.51))
     assert len(T)
     grades = seen_from(
@@ -119,7 +119,7 @@ def test_imaging_configurations_see_the_whole_bin_and_are_free():
     T_flange_camera[:3, 3] = camera.xyz
     T_tcp_flange = np.eye(4)
     T_tcp_flange[2, 3] = -0.275
-    found = list(imaging_configurations(placed))
+    found = list(imaging_configurations(placed.scene, placed.Q, placed.frame))
     assert len(found) >= 4
     inner = scene.loaded.cell.bin.inner
     corners = corners_of(inner, inner[2]) @ scene.T_base_bin[:3, :3].T
@@ -138,7 +138,9 @@ def test_something_in_the_line_of_sight_leaves_no_configuration():
         '"shape":{"box":[0.5,0.5,0.002]},"pose":{"xyz":[0.45,0,0.12]}}'
     )
     placed = placed_ur5((0.45, 0.0, 0.0, 1.57), plate)
-    assert next(imaging_configurations(placed), None) is None
+    assert (
+        next(imaging_configurations(placed.scene, placed.Q, placed.frame), None) is None
+    )
 
 
 def test_a_cell_without_a_camera_on_its_tool_keeps_its_configuration():

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import lru_cache
 
 import numpy as np
 
 from reachmap._typing import FloatArray, IntArray
+from reachmap.cell.model import CameraSpec
 from reachmap.core.scene import Scene
 from reachmap.core.sight import Camera
 from reachmap.geometry import inverse_transform
-from reachmap.placement.exact import PlacedScene
 from reachmap.placement.viewpoints import (
     NOT_SEEN,
     View,
@@ -30,7 +31,9 @@ def can_choose(scene: Scene) -> bool:
     return loaded.cell.camera is not None and Camera(scene.robot, loaded).is_carried
 
 
-def imaging_configurations(placed: PlacedScene) -> Iterator[FloatArray]:
+def imaging_configurations(
+    scene: Scene, goals: FloatArray | None = None, frame: IntArray | None = None
+) -> Iterator[FloatArray]:
     """Configurations that image the bin, far from each other, most promising first.
 
     They see the pick volume from within the camera's range, with nothing in between,
@@ -39,32 +42,33 @@ def imaging_configurations(placed: PlacedScene) -> Iterator[FloatArray]:
 
     Parameters
     ----------
-    placed : PlacedScene
-        Of a cell with a camera on the tool.
+    scene : Scene
+        Of a cell with a camera on the tool, with the bin.
+    goals : array, shape (n, dof), optional
+        Free configurations at the grasps [rad].
+    frame : int array, shape (n,), optional
+        Test frame of each, rising.
 
     Yields
     ------
     array, shape (dof,)
         [rad].
     """
-    scene = placed.scene
-    cell = scene.loaded.cell
+    cell, T_base_bin = scene.loaded.cell, scene.T_base_bin
     assert cell.camera is not None
     scene.checker.reset()
-    view = view_of(cell.bin, cell.bin_scan.layers)
+    view = view_of(cell.bin.inner, cell.bin_scan.layers)
     camera = Camera(scene.robot, scene.loaded)
-    T_bin_camera = camera_poses(view, cell.camera.range_m)
-    missing = seen_from(T_bin_camera, view, cell.camera)
-    rows = np.flatnonzero(missing < NOT_SEEN)
-    T_base_camera = scene.T_base_bin @ T_bin_camera[rows]
+    T_bin_camera, missing = _views(cell.bin.inner, cell.bin_scan.layers, cell.camera)
+    T_base_camera = T_base_bin @ T_bin_camera
     Q, pose = scene.kinematics.solve_many(
         T_base_camera @ inverse_transform(camera.T_tcp_camera), windings=False
     )
     free = scene.checker.free_mask(Q)
     Q, pose = Q[free], pose[free]
-    corners = _inset(view, scene.T_base_bin)
+    corners = _inset(view, T_base_bin)
     chosen: list[FloatArray] = []
-    for k in _order(placed, Q, missing[rows][pose]):
+    for k in np.lexsort((_farness(Q, goals, frame), missing[pose])):
         q = Q[k]
         if any(np.linalg.norm(q - other) < APART_RAD for other in chosen):
             continue
@@ -74,23 +78,36 @@ def imaging_configurations(placed: PlacedScene) -> Iterator[FloatArray]:
         yield q
 
 
-def _order(placed: PlacedScene, Q: FloatArray, missing: IntArray) -> IntArray:
-    """Rows of Q: those that miss least first, then by nearness to the grasps.
+@lru_cache(maxsize=4)
+def _views(
+    inner: tuple[float, float, float], layers: tuple[float, ...], camera: CameraSpec
+) -> tuple[FloatArray, IntArray]:
+    """Camera poses T_bin_camera that see the bin, and what each misses.
 
-    Nearness is the mean over test frames of the straight distance to the nearest
-    grasp, which no path can undercut.
+    The same wherever the bin stands; there are tens of thousands to choose from.
     """
-    goals, frame = placed.Q, placed.frame
-    if not len(goals) or not len(Q):
-        return np.argsort(missing, kind="stable")
+    view = view_of(inner, layers)
+    T_bin_camera = camera_poses(view, camera.range_m)
+    missing = seen_from(T_bin_camera, view, camera)
+    seen = missing < NOT_SEEN
+    return T_bin_camera[seen], missing[seen]
+
+
+def _farness(
+    Q: FloatArray, goals: FloatArray | None, frame: IntArray | None
+) -> FloatArray:
+    """How far each of Q is from the grasps, shape (n,).
+
+    The mean over test frames of the straight distance to the nearest grasp, which no
+    path can undercut.
+    """
+    if goals is None or frame is None or not len(goals):
+        return np.zeros(len(Q))
     begins = np.flatnonzero(np.r_[True, np.diff(frame) > 0])
-    nearness = np.array(
-        [
-            np.minimum.reduceat(np.linalg.norm(goals - q, axis=1), begins).mean()
-            for q in Q
-        ]
-    )
-    return np.lexsort((np.round(nearness, 6), missing))
+    nearest = [
+        np.minimum.reduceat(np.linalg.norm(goals - q, axis=1), begins) for q in Q
+    ]
+    return np.round([float(distances.mean()) for distances in nearest], 6)
 
 
 def _inset(view: View, T_base_bin: FloatArray) -> FloatArray:

@@ -9,18 +9,16 @@ import numpy as np
 
 from reachmap._typing import FloatArray
 from reachmap.core.bin_fit import BinFit
-from reachmap.core.scene import Scene
 from reachmap.errors import SceneError
 from reachmap.geometry import yaw_transform
 from reachmap.placement.candidates import Candidate
-from reachmap.placement.decision import SETTLING, Decision, Question
+from reachmap.placement.decision import REMEDY, SETTLING, Decision
 from reachmap.placement.exact import PlacedScene, Pose
 from reachmap.placement.imaging import UNSEEN
 from reachmap.placement.margins import margins
+from reachmap.placement.question import Question
 from reachmap.placement.sample import THIN, sample_of
 from reachmap.placement.scan_choice import ScanChoice, choose_scan
-
-POSES_TRIED = 5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -43,9 +41,7 @@ class Outcome:
     margin: dict[str, float]
 
 
-def settle(
-    question: Question, decision: Decision, *, tries: int = POSES_TRIED
-) -> Outcome:
+def settle(question: Question, decision: Decision) -> Outcome:
     """Choose the best pose that can be imaged, and its scan configuration.
 
     Parameters
@@ -54,16 +50,14 @@ def settle(
     decision : Decision
         Its table gets a row for the chosen pose as seen from a new configuration,
         and reasons where there is none.
-    tries : int
-        How many of the best poses may turn out not to be imaged.
 
     Raises
     ------
     SceneError
-        No pose that was tried can be imaged.
+        No pose that was mapped can be imaged.
     """
     rows = decision.table.rows
-    for row in decision.ranked[:tries]:
+    for row in decision.ranked:
         question.evaluator.expect(SETTLING)
         scan = _scan(question, rows[row])
         if scan is None:
@@ -82,18 +76,13 @@ def settle(
             scan=scan,
             margin=_margins(question, pose, scan.q),
         )
-    raise SceneError(
-        f"{question.loaded.source}: {UNSEEN} at any of the {min(tries, len(rows))} "
-        "best poses; look at camera.range_m and camera.field_of_view_deg, or leave "
-        "the cell's own with --keep-scan-configuration"
-    )
+    raise SceneError(f"{question.loaded.source}: {UNSEEN}; {REMEDY}")
 
 
 def _scan(question: Question, candidate: Candidate) -> ScanChoice | None:
     if not question.keep_scan:
         sample = sample_of(question.loaded.cell, THIN, question.is_open)
-        scene = Scene.build(question.loaded, with_bin=True, bin_moves=True)
-        placed = PlacedScene(scene, candidate.pose, sample)
+        placed = PlacedScene(question.moving, candidate.pose, sample)
         return choose_scan(placed, question.evaluator)
     assert candidate.score is not None
     q: FloatArray = np.array(question.scene.scan_configuration)

@@ -59,18 +59,23 @@ def best_at_each_place(
 
 
 def spread_out(
-    candidates: Sequence[Candidate], count: int, distance_m: float
+    candidates: Sequence[Candidate],
+    count: int,
+    distance_m: float,
+    is_usable: Callable[[Candidate], bool] = lambda candidate: True,
 ) -> list[Candidate]:
     """Best candidates that stand at least a distance apart, best first.
 
     This is non-maximum suppression: whatever stands near a better one is passed over.
+    So is what turns out not to be usable, which is asked of few.
     """
     chosen: list[Candidate] = []
-    usable = [c for c in candidates if c.score is not None]
-    for candidate in sorted(usable, key=rank_key):
+    scored = [c for c in candidates if c.score is not None]
+    for candidate in sorted(scored, key=rank_key):
         if len(chosen) == count:
             break
-        if all(apart_m(candidate.pose, c.pose) >= distance_m for c in chosen):
+        apart = all(apart_m(candidate.pose, c.pose) >= distance_m for c in chosen)
+        if apart and is_usable(candidate):
             chosen.append(candidate)
     return chosen
 

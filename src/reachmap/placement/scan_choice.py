@@ -52,13 +52,14 @@ def choose_scan(placed: PlacedScene, evaluator: Evaluator) -> ScanChoice | None:
     ScanChoice or None
         None if no configuration images the bin.
     """
-    finalists = list(islice(imaging_configurations(placed), FINALISTS))
+    found = imaging_configurations(placed.scene, placed.Q, placed.frame)
+    finalists = list(islice(found, FINALISTS))
     if not finalists:
         return None
-    found = evaluator.evaluate([placed.pose] * len(finalists), np.array(finalists))
+    mapped = evaluator.evaluate([placed.pose] * len(finalists), np.array(finalists))
     scored = [
         (e.score, q)
-        for e, q in zip(found, finalists, strict=True)
+        for e, q in zip(mapped, finalists, strict=True)
         if e.score is not None
     ]
     if not scored:

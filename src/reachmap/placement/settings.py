@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 
 from reachmap.placement import (
-    decision,
     exact,
     footprint,
     imaging,
@@ -16,6 +15,7 @@ from reachmap.placement import (
     refine,
     sample,
     scan_choice,
+    search,
     viewpoints,
 )
 
@@ -33,8 +33,10 @@ def placement_settings() -> dict[str, Any]:
         "steps_per_square": places.STEPS_PER_SQUARE,
         "yaw_step_deg": places.YAW_STEP_DEG,
         "yaws_per_level": places.YAWS_PER_LEVEL,
-        "turns_deg": list(decision.TURNS_DEG),
-        "places_improved": decision.PLACES_IMPROVED,
+        "most_unseen": search.MOST_UNSEEN,
+        "near_unseen_m": search.NEAR_UNSEEN_M,
+        "turns_deg": list(search.TURNS_DEG),
+        "places_improved": search.PLACES_IMPROVED,
         "refine_steps": np.round(refine.FIRST_STEPS, 9).tolist(),
         "refine_rounds": refine.ROUNDS,
         "refine_halvings": refine.HALVINGS,

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from reachmap._typing import BoolArray, FloatArray, IntArray
-from reachmap.cell.model import BinSpec, CameraSpec
+from reachmap.cell.model import CameraSpec
 from reachmap.geometry import inverse_transform, transform_from_parts
 
 DISTANCES = 6
@@ -38,9 +38,9 @@ class View:
     rim: FloatArray
 
 
-def view_of(spec: BinSpec, layers: tuple[float, ...]) -> View:
-    """Corners of a bin that its camera should see."""
-    x, y, depth = spec.inner
+def view_of(inner: tuple[float, float, float], layers: tuple[float, ...]) -> View:
+    """Corners of a bin, by its inner size, that its camera should see."""
+    x, y, depth = inner
     top = min(max(layers), depth)
     flat = np.array([[sx * x / 2, sy * y / 2] for sx in (-1, 1) for sy in (-1, 1)])
 

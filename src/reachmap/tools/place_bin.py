@@ -25,19 +25,15 @@ from reachmap.maps import (
     write_placement,
 )
 from reachmap.maps.records import Stamp
-from reachmap.placement.decision import (
-    Decision,
-    Question,
-    decide_as_given,
-    decide_by_paper,
-    decide_by_search,
-)
+from reachmap.placement.decision import Decision, decide_as_given, decide_by_paper
 from reachmap.placement.evaluator import open_evaluator
 from reachmap.placement.exact import Pose
 from reachmap.placement.imaging import can_choose
 from reachmap.placement.outcome import Outcome, settle
+from reachmap.placement.question import Question
 from reachmap.placement.region import AXES, Region, region_of
 from reachmap.placement.sample import open_frames
+from reachmap.placement.search import decide_by_search
 from reachmap.placement.settings import placement_settings
 from reachmap.placement.summary import best_rows, placement_facts, row_facts
 from reachmap.placement.viewpoints import picture_corners
@@ -154,6 +150,7 @@ def place_bin(
             is_open=is_open,
             region=region,
             scene=scene,
+            moving=Scene.build(loaded, with_bin=True, bin_moves=True),
             keep_scan=keep_scan,
             fit=BinFit(scene.robot, loaded, q),
             evaluator=evaluator,
@@ -161,11 +158,7 @@ def place_bin(
         with clock.phase("decide"):
             decision = _decide(question, choice)
         with clock.phase("settle"):
-            outcome = settle(
-                question,
-                decision,
-                tries=5 if choice.rule == "search" and not choice.bin_pose else 1,
-            )
+            outcome = settle(question, decision)
         clock.add_cpu("workers", evaluator.cpu_s if run.workers > 1 else 0.0)
     placement = _record(question, decision, outcome, choice, clock)
     write_placement(output, placement, overwrite=run.overwrite)

@@ -1,0 +1,135 @@
+"""Searches x, y, z and yaw: predicted places, mapped exactly, then improved."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from reachmap.errors import SceneError
+from reachmap.placement import refine
+from reachmap.placement.candidates import Candidate, CandidateTable
+from reachmap.placement.decision import (
+    REMEDY,
+    SETTLING,
+    Decision,
+    nowhere,
+    paper_pose,
+)
+from reachmap.placement.exact import Pose
+from reachmap.placement.imaging import UNSEEN
+from reachmap.placement.places import apart_m, rank_key, spread_out
+from reachmap.placement.question import Question
+
+TURNS_DEG = (45.0, 90.0, 135.0)
+PLACES_IMPROVED = 2
+MOST_TURNS = PLACES_IMPROVED * len(TURNS_DEG)
+# Poses found not to be imaged, until no more are tried; what is near is not tried.
+MOST_UNSEEN = 40
+NEAR_UNSEEN_M = 0.05
+
+
+def decide_by_search(question: Question, top: int) -> Decision:
+    """Search x, y, z and yaw.
+
+    Parameters
+    ----------
+    question : Question
+    top : int
+        Different places that are mapped with the bin in the scene.
+
+    Raises
+    ------
+    SceneError
+        The bin can stand nowhere.
+    """
+    decision = Decision()
+    finalists = _finalists(question, top, decision.table)
+    paper = paper_pose(question)
+    poses = [c.pose for c in finalists] + ([] if paper is None else [paper])
+    question.evaluator.expect(len(poses) + MOST_TURNS + refine.MOST_POSES + SETTLING)
+    mapped = question.exact(poses)
+    scored = sorted((c for c in mapped if c.score is not None), key=rank_key)
+    better = _improved(question, scored[:PLACES_IMPROVED])
+    mapped += question.exact([pose for pose in better if pose not in poses])
+    for candidate in {c.pose: c for c in mapped}.values():
+        row = decision.table.add(candidate)
+        if candidate.pose == paper:
+            decision.paper = row
+    decision.rank()
+    if not decision.ranked:
+        raise SceneError(nowhere(question, decision.table))
+    return decision
+
+
+def _finalists(question: Question, top: int, table: CandidateTable) -> list[Candidate]:
+    """Best places that can be imaged; all that were considered go into a table."""
+    places = question.predicted()
+    unseen: list[Candidate] = []
+
+    def can_be_imaged(candidate: Candidate) -> bool:
+        if len(unseen) == MOST_UNSEEN or any(
+            apart_m(candidate.pose, other.pose) < NEAR_UNSEEN_M for other in unseen
+        ):
+            return False
+        seen = question.can_be_imaged(candidate.pose)
+        if not seen:
+            unseen.append(candidate)
+        return seen
+
+    found = spread_out(places, top, question.different_place_m, can_be_imaged)
+    for place in places:
+        is_unseen = any(place is other for other in unseen)
+        table.add(Candidate(pose=place.pose, reason=UNSEEN) if is_unseen else place)
+    if unseen and not found:
+        raise SceneError(
+            f"{question.loaded.source}: {UNSEEN} at any of the {len(unseen)} best "
+            f"places; look elsewhere with --heights or --region, or {REMEDY}"
+        )
+    return found
+
+
+def _improved(question: Question, starts: list[Candidate]) -> list[Pose]:
+    """Better poses near some places: turned first, then the best of all moved.
+
+    A pose counts as better by a quarter of a point.
+    """
+    if not starts:
+        return []
+    evaluator = question.evaluator
+    evaluator.expect(MOST_TURNS + refine.MOST_POSES + SETTLING)
+    best = _turned(question, starts)
+    evaluator.expect(refine.MOST_POSES + SETTLING)
+    moved = refine.refine(
+        min(best, key=rank_key),
+        question.start,
+        question.region,
+        question.reason_against,
+        evaluator,
+    )
+    return list(dict.fromkeys([moved.pose, *(c.pose for c in best)]))
+
+
+def _turned(question: Question, starts: list[Candidate]) -> list[Candidate]:
+    """Each of some candidates, or a better one at the same place."""
+    turns = {
+        pose: start
+        for start in starts
+        for pose in (_with_turn(start.pose, turn, question) for turn in TURNS_DEG)
+        if not question.reason_against(pose)
+    }
+    above = [
+        start.score.score + refine.MIN_GAIN_POINTS
+        for start in turns.values()
+        if start.score is not None
+    ]
+    found = question.exact(list(turns), above=above)
+    better = [c for c in found if c.score is not None]
+    return [
+        min([start, *(c for c in better if turns[c.pose] is start)], key=rank_key)
+        for start in starts
+    ]
+
+
+def _with_turn(pose: Pose, turn_deg: float, question: Question) -> Pose:
+    low = float(question.region.low[3])
+    yaw = low + (pose[3] + np.radians(turn_deg) - low) % np.pi
+    return (*pose[:3], round(float(yaw), 9))
