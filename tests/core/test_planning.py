@@ -90,6 +90,35 @@ def test_the_safety_net_is_recorded():
     assert plan.hit_time_limit
 
 
+def test_a_search_begun_anew_still_ends_and_is_counted_whole():
+    """Searches of 1, 2, 4, … checks find a path; the attempt counts all of them."""
+    scene = scene_of("ur5-eye-in-hand")
+    goals, start = bin_goals(scene, 1)[0], scene.scan_configuration
+    at_once = planner_of(scene, restart_checks=None).plan(start, goals, 7)
+    never_reached = planner_of(scene, restart_checks=20000).plan(start, goals, 7)
+    np.testing.assert_array_equal(never_reached.path, at_once.path)
+    assert never_reached.checks == at_once.checks
+    anew = planner_of(scene, restart_checks=1).plan(start, goals, 7)
+    assert scene.motions.path_is_verified(anew.path)
+    assert anew.checks > at_once.checks / 2
+
+
+def test_beginning_anew_cuts_the_tail():
+    """The unluckiest of many attempts cost less when searches are begun anew."""
+    scene = scene_of("ur5-eye-in-hand")
+    start, sets = scene.scan_configuration, bin_goals(scene, 12)
+
+    def checks(**spec):
+        planner = planner_of(scene, **spec)
+        return np.array(
+            [planner.plan(start, g, seed).checks for g in sets for seed in range(30)]
+        )
+
+    through, anew = checks(restart_checks=None), checks()
+    assert np.quantile(anew, 0.99) < np.quantile(through, 0.99)
+    assert anew.mean() < 1.05 * through.mean()
+
+
 def test_no_goals_is_no_path():
     """An empty set of goals is answered at once."""
     scene = scene_of("planar-toy")

@@ -5,8 +5,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from reachmap.cell.loading import read_cell
 from reachmap.cell.orientations import ConeFamily, ListFamily
 from reachmap.geometry import rotation_angle, rotation_from_rpy_deg
+from reachmap.ranking.approach import align
 from reachmap.sampling.orientations import (
     approach_directions,
     orientation_set,
@@ -106,6 +108,56 @@ def test_roll_offset_and_span_are_honoured(
         np.testing.assert_allclose(
             R[k], turn @ straight_down_orientation(axis), atol=1e-14
         )
+
+
+def test_rolls_may_differ_from_ring_to_ring() -> None:
+    """A family with its own rolls in each ring is its rings, one after the other."""
+    family = ConeFamily(
+        tilts_deg=(0, 20, 35),
+        azimuths=(1, 4, 8),
+        azimuth_offset_deg=10,
+        rolls=(3, 1, 2),
+        roll_offset_deg=(120, 180, -15),
+        roll_span_deg=90,
+    )
+    rings = [
+        ConeFamily(
+            tilts_deg=(tilt,),
+            azimuths=(count,),
+            azimuth_offset_deg=10,
+            rolls=rolls,
+            roll_offset_deg=offset,
+            roll_span_deg=90,
+        )
+        for tilt, count, rolls, offset in (
+            (0, 1, 3, 120),
+            (20, 4, 1, 180),
+            (35, 8, 2, -15),
+        )
+    ]
+    assert family.count() == 3 + 4 + 16
+    np.testing.assert_array_equal(
+        orientation_set(family), np.concatenate([orientation_set(r) for r in rings])
+    )
+
+
+@pytest.mark.parametrize("name", ["azimuths", "rolls", "roll_offset_deg"])
+def test_what_is_given_ring_by_ring_is_given_for_every_ring(name: str) -> None:
+    """A list of another length than the tilts is a mistake, and its name is said."""
+    with pytest.raises(ValueError, match=rf"tilts_deg and {name} .* \(got 2 and 3\)"):
+        ConeFamily(**{"tilts_deg": (0, 30), name: (1, 2, 3)})
+
+
+def test_the_shipped_cell_keeps_the_published_number_and_wrist_of_each_tilt() -> None:
+    """27 orientations; one roll for tilted tools, the middle one of straight down."""
+    loaded = read_cell("ur5-eye-in-hand", ())
+    family = loaded.cell.bin_scan.orientations
+    assert isinstance(family, ConeFamily)
+    R = orientation_set(family, "+z")
+    assert len(R) == family.count() == 27
+    a = approach_directions(R, "+z")
+    back = align(R, np.broadcast_to([0.0, 0.0, -1.0], a.shape), "+z")
+    np.testing.assert_allclose(back[3:], np.broadcast_to(R[1], (24, 3, 3)), atol=1e-12)
 
 
 def test_a_list_is_taken_as_it_stands() -> None:

@@ -39,6 +39,12 @@ class PlannerSpec(Record):
     max_checks: int = Field(
         20000, ge=1, le=10**9, description="Work budget of one attempt, state checks."
     )
+    restart_checks: int | None = Field(
+        150,
+        ge=1,
+        description="A search that found nothing after so many state checks begins "
+        "anew, each time with twice as many; null: it goes on.",
+    )
     time_limit_s: Positive = Field(
         60.0, description="Safety net [s]; recorded when it ends an attempt."
     )

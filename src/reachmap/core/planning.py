@@ -2,6 +2,7 @@
 
 A plan is found at the planning step, shortened, and counts only when it passes the
 verification distance; otherwise the attempt goes on with what is left of its budget.
+A search that takes long is begun anew, for its length is luck more often than need.
 Budgets are state checks, so the same seed gives the same path on any machine; the
 limit in seconds is a safety net that is recorded when it strikes.
 """
@@ -19,19 +20,18 @@ from ompl import util as ou
 
 from reachmap._typing import FloatArray
 from reachmap.cell.planner import PlannerSpec
+from reachmap.core.budget import Budget
 from reachmap.core.motion import MotionChecker
 from reachmap.core.simplification import shorten
 from reachmap.errors import EngineError
 
 ou.setLogLevel(ou.LogLevel.LOG_NONE)
 
-_CLOCK_EVERY = 64
-# A planner asks once per iteration whether to go on. Some iterations check nothing;
-# a planner that only makes such iterations is to end by a count as well.
-_CALLS_PER_CHECK = 20
 _OPTIMISING = frozenset(
     {"RRTstar", "BITstar", "InformedRRTstar", "SORRTstar", "AORRTC"}
 )
+# Their samples are drawn beforehand: begun anew they would have to be connected again.
+_BATCH = frozenset({"FMT", "BFMT"})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -111,8 +111,8 @@ class Planner:
         inside = ((goals >= self._lower) & (goals <= self._upper)).all(axis=1)
         rows = np.flatnonzero(inside)
         goals = goals[rows]
-        budget = _Budget(
-            self.motions,
+        budget = Budget(
+            self.motions.checker,
             max_checks or self.spec.max_checks,
             self.spec.time_limit_s,
         )
@@ -120,7 +120,9 @@ class Planner:
         wall = cpu = shortening = 0.0
         unverified = 0
         path = None
+        allowance = self._first_allowance(budget)
         while len(goals) and path is None and not budget.spent():
+            budget.begin_search(allowance)
             wall_0, cpu_0 = time.perf_counter(), time.thread_time()
             search = self._search(start, goals, seeds.spawn(1)[0], budget)
             wall += time.perf_counter() - wall_0
@@ -128,7 +130,10 @@ class Planner:
             cpu_1 = time.thread_time()
             cpu += cpu_1 - cpu_0
             if search is None:
-                break
+                if not budget.search_interrupted:
+                    break
+                allowance *= 2
+                continue
             with budget.paused():
                 path = self._shorten_and_verify(search, goals, seed)
             shortening += time.thread_time() - cpu_1
@@ -144,12 +149,19 @@ class Planner:
             unverified=unverified,
         )
 
+    def _first_allowance(self, budget: Budget) -> int:
+        """Checks of the first search, all there are for planners that make one."""
+        restart = self.spec.restart_checks
+        if restart is None or self.spec.name in _OPTIMISING | _BATCH:
+            return budget.checks
+        return restart
+
     def _search(
         self,
         start: FloatArray,
         goals: FloatArray,
         seed: np.random.SeedSequence,
-        budget: _Budget,
+        budget: Budget,
     ) -> _Search | None:
         """One run of the OMPL planner, or None without an exact solution."""
         # The seed is global in OMPL, and acts on what is built after it.
@@ -175,7 +187,7 @@ class Planner:
         planner = self._planner(information)
         planner.setProblemDefinition(problem)
         planner.setup()
-        planner.solve(ob.PlannerTerminationCondition(budget.spent))
+        planner.solve(ob.PlannerTerminationCondition(budget.search_ends))
         if not problem.hasExactSolution():
             return None
         return _Search(information, problem.getSolutionPath(), len(start))
@@ -270,52 +282,6 @@ class _MotionValidator(ob.MotionValidator):  # type: ignore[misc]
             np.array([first[i] for i in self._dof]),
             np.array([second[i] for i in self._dof]),
         )
-
-
-class _Budget:
-    """State checks left for searching; shortening does not count."""
-
-    def __init__(self, motions: MotionChecker, checks: int, seconds: float) -> None:
-        self._checker = motions.checker
-        self._limit = self._checker.checks + checks
-        self._begin = self._checker.checks
-        self._deadline = time.monotonic() + seconds
-        self._calls = 0
-        self._most_calls = _CALLS_PER_CHECK * checks
-        self.out_of_time = False
-
-    def used(self) -> int:
-        """State checks spent on searching."""
-        return self._checker.checks - self._begin
-
-    def spent(self) -> bool:
-        """Whether the checks, or the seconds of the safety net, are used up."""
-        self._calls += 1
-        if self._checker.checks >= self._limit or self._calls >= self._most_calls:
-            return True
-        if self._calls % _CLOCK_EVERY == 0 and time.monotonic() > self._deadline:
-            self.out_of_time = True
-        return self.out_of_time
-
-    def paused(self) -> _Pause:
-        """Context in which checks are not counted."""
-        return _Pause(self)
-
-    def give_back(self, checks: int) -> None:
-        """Move the limits by checks that do not count."""
-        self._limit += checks
-        self._begin += checks
-
-
-class _Pause:
-    def __init__(self, budget: _Budget) -> None:
-        self._budget = budget
-
-    def __enter__(self) -> None:
-        self._used = self._budget.used()
-
-    def __exit__(self, *_: object) -> None:
-        self._budget.give_back(self._budget.used() - self._used)
 
 
 def _state(information: Any, q: FloatArray) -> Any:

@@ -158,13 +158,24 @@ def reduced_model(
     locked = [full.getJointId(n) for n in list(full.names)[1:] if n not in moving]
     try:
         model = pin.buildReducedModel(full, locked, q_locked)
-    except ValueError as error:  # a link and a locked joint of one name, say
-        raise SceneError(f"robot.urdf: joints cannot be locked ({error})") from error
+    except ValueError as error:
+        raise SceneError(_why_not_reduced(full, str(error))) from error
     if list(model.names)[1:] != list(moving):
         raise SceneError("robot.urdf: the joints from base to TCP are not one chain")
     model.lowerPositionLimit = limits.lower
     model.upperPositionLimit = limits.upper
     return model, limits
+
+
+def _why_not_reduced(full: Any, said: str) -> str:
+    shared = [n for n in full.names if full.existFrame(n, pin.FrameType.BODY)]
+    if not shared:
+        return f"robot.urdf: joints cannot be locked ({said})"
+    return (
+        f"robot.urdf: {', '.join(map(repr, shared))}: names of a joint and of a link, "
+        "which are told apart by name when other joints are locked; rename the joint "
+        "in a copy of the URDF"
+    )
 
 
 def add_tcp(model: Any, spec: RobotSpec) -> Any:

@@ -35,13 +35,14 @@ def orientation_set(
     if isinstance(family, ListFamily):
         return rotation_from_rpy_deg(np.array(family.rpy_deg))
     upright = straight_down_orientation(approach_axis)
-    rolls_deg = family.roll_offset_deg + (
-        np.arange(family.rolls) * family.roll_span_deg / family.rolls
-    )
     blocks = []
-    for tilt_deg, count in zip(family.tilts_deg, family.azimuths, strict=True):
-        for azimuth_deg in family.azimuth_offset_deg + np.arange(count) * 360.0 / count:
-            tilt = _tilt_rotation(tilt_deg, azimuth_deg)
+    for ring in family.rings():
+        rolls_deg = ring.roll_offset_deg + (
+            np.arange(ring.rolls) * family.roll_span_deg / ring.rolls
+        )
+        azimuths_deg = np.arange(ring.azimuths) * 360.0 / ring.azimuths
+        for azimuth_deg in family.azimuth_offset_deg + azimuths_deg:
+            tilt = _tilt_rotation(ring.tilt_deg, azimuth_deg)
             approach = -tilt[:, 2]
             roll = Rotation.from_rotvec(np.outer(np.radians(rolls_deg), approach))
             blocks.append(roll.as_matrix() @ (tilt @ upright))
