@@ -39,6 +39,11 @@ class PlannerSpec(Record):
     max_checks: int = Field(
         20000, ge=1, le=10**9, description="Work budget of one attempt, state checks."
     )
+    straight_first: bool = Field(
+        True,
+        description="Try the straight motion to the nearest goal before searching: "
+        "free, it is the shortest path there is.",
+    )
     restart_checks: int | None = Field(
         150,
         ge=1,

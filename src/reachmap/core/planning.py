@@ -2,7 +2,8 @@
 
 A plan is found at the planning step, shortened, and counts only when it passes the
 verification distance; otherwise the attempt goes on with what is left of its budget.
-A search that takes long is begun anew, for its length is luck more often than need.
+The straight motion to the nearest goal is tried before any search; a search that takes
+long is begun anew, for its length is luck more often than need.
 Budgets are state checks, so the same seed gives the same path on any machine; the
 limit in seconds is a safety net that is recorded when it strikes.
 """
@@ -10,6 +11,7 @@ limit in seconds is a safety net that is recorded when it strikes.
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -116,38 +118,51 @@ class Planner:
             max_checks or self.spec.max_checks,
             self.spec.time_limit_s,
         )
-        seeds = np.random.SeedSequence(seed)
-        wall = cpu = shortening = 0.0
-        unverified = 0
-        path = None
-        allowance = self._first_allowance(budget)
-        while len(goals) and path is None and not budget.spent():
-            budget.begin_search(allowance)
-            wall_0, cpu_0 = time.perf_counter(), time.thread_time()
-            search = self._search(start, goals, seeds.spawn(1)[0], budget)
-            wall += time.perf_counter() - wall_0
-            # The thread's clock takes long to read; it is read no more than needed.
-            cpu_1 = time.thread_time()
-            cpu += cpu_1 - cpu_0
-            if search is None:
-                if not budget.search_interrupted:
-                    break
-                allowance *= 2
-                continue
+        clock = _Clock()
+        unverified, path = 0, None
+        for found in self._found(start, goals, seed, budget):
+            clock.end_search()
             with budget.paused():
-                path = self._shorten_and_verify(search, goals, seed)
-            shortening += time.thread_time() - cpu_1
-            unverified += path is None
+                path = self._shorten_and_verify(found, goals, seed)
+            clock.end_shortening()
+            if path is not None:
+                break
+            unverified += 1
+        else:
+            clock.end_search()
         return PlanResult(
             path=path,
             goal=-1 if path is None else int(rows[_nearest_row(goals, path[-1])]),
             checks=budget.used(),
-            planning_time_s=wall,
-            planning_cpu_time_s=cpu,
-            simplification_time_s=shortening,
+            planning_time_s=clock.search_wall_s,
+            planning_cpu_time_s=clock.search_cpu_s,
+            simplification_time_s=clock.shortening_cpu_s,
             hit_time_limit=budget.out_of_time,
             unverified=unverified,
         )
+
+    def _found(
+        self, start: FloatArray, goals: FloatArray, seed: int, budget: Budget
+    ) -> Iterator[_Straight | _Search]:
+        """Paths at the planning step, until the budget is spent."""
+        if not len(goals):
+            return
+        if self.spec.straight_first:
+            # Free, it is the shortest path there is: nothing is left to search for.
+            nearest = goals[np.argmin(np.linalg.norm(goals - start, axis=1))]
+            if self.motions.is_free(start, nearest):
+                yield _Straight(np.array([start, nearest]))
+        seeds = np.random.SeedSequence(seed)
+        allowance = self._first_allowance(budget)
+        while not budget.spent():
+            budget.begin_search(allowance)
+            search = self._search(start, goals, seeds.spawn(1)[0], budget)
+            if search is not None:
+                yield search
+            elif budget.search_interrupted:
+                allowance *= 2
+            else:
+                return
 
     def _first_allowance(self, budget: Budget) -> int:
         """Checks of the first search, all there are for planners that make one."""
@@ -228,15 +243,15 @@ class Planner:
         )
 
     def _shorten_and_verify(
-        self, search: _Search, goals: FloatArray, seed: int
+        self, found: _Straight | _Search, goals: FloatArray, seed: int
     ) -> FloatArray | None:
         """Shorten at the planning step; where that fails to verify, more carefully."""
         motions, settings = self.motions, self.spec.simplification
-        raw = search.waypoints()
-        if settings.method == "none":
+        raw = found.waypoints()
+        if settings.method == "none" or isinstance(found, _Straight):
             return raw if motions.path_is_verified(raw) else None
         if settings.method == "simplify_max":
-            short = search.simplified()
+            short = found.simplified()
             return short if motions.path_is_verified(short) else None
         for is_free in (motions.is_free, motions.is_verified):
             rng = np.random.default_rng(seed)
@@ -250,6 +265,17 @@ class Planner:
             if motions.path_is_verified(short):
                 return short
         return None
+
+
+@dataclass(frozen=True, slots=True)
+class _Straight:
+    """The straight motion to a goal."""
+
+    path: FloatArray
+
+    def waypoints(self) -> FloatArray:
+        """Start and goal, shape (2, dof)."""
+        return self.path
 
 
 class _Search:
@@ -282,6 +308,28 @@ class _MotionValidator(ob.MotionValidator):  # type: ignore[misc]
             np.array([first[i] for i in self._dof]),
             np.array([second[i] for i in self._dof]),
         )
+
+
+class _Clock:
+    """Adds up what searching and shortening take."""
+
+    def __init__(self) -> None:
+        self.search_wall_s = self.search_cpu_s = self.shortening_cpu_s = 0.0
+        self._wall, self._cpu = time.perf_counter(), time.thread_time()
+
+    def end_search(self) -> None:
+        """Count the time since the last call as searching."""
+        # The thread's clock takes long to read; it is read no more than needed.
+        wall, cpu = time.perf_counter(), time.thread_time()
+        self.search_wall_s += wall - self._wall
+        self.search_cpu_s += cpu - self._cpu
+        self._cpu = cpu
+
+    def end_shortening(self) -> None:
+        """Count the time since the last call as shortening and verifying."""
+        cpu = time.thread_time()
+        self.shortening_cpu_s += cpu - self._cpu
+        self._wall, self._cpu = time.perf_counter(), cpu
 
 
 def _state(information: Any, q: FloatArray) -> Any:
