@@ -21,9 +21,10 @@ from reachmap.scans.survey import survey_frames
 
 
 def planner_of(scene, **spec):
-    """Planner of a scene with other settings."""
+    """Planner of a scene with other settings; it searches unless told otherwise."""
+    settings = PlannerSpec(**{"straight_first": False, **spec})
     return Planner(
-        scene.motions, scene.robot.lower_rad, scene.robot.upper_rad, PlannerSpec(**spec)
+        scene.motions, scene.robot.lower_rad, scene.robot.upper_rad, settings
     )
 
 
@@ -60,14 +61,54 @@ def test_a_seed_is_a_path():
     scene = scene_of("ur5-eye-in-hand")
     goals = bin_goals(scene, 1)[0]
     start = scene.scan_configuration
+    planner = planner_of(scene)
     scene.checker.reset()
-    first = scene.planner.plan(start, goals, 7)
-    scene.planner.plan(start, goals, 8)
+    first = planner.plan(start, goals, 7)
+    planner.plan(start, goals, 8)
     scene.checker.reset()
-    again = scene.planner.plan(start, goals, 7)
+    again = planner.plan(start, goals, 7)
     np.testing.assert_array_equal(first.path, again.path)
     assert first.checks == again.checks
-    assert first.checks != scene.planner.plan(start, goals, 9).checks
+    assert first.checks != planner.plan(start, goals, 9).checks
+
+
+def test_a_free_straight_motion_is_the_path():
+    """To the nearest goal, whatever the seed: no path to any goal is shorter."""
+    scene = scene_of("ur5-eye-in-hand")
+    start, straight = scene.scan_configuration, 0
+    for goals in bin_goals(scene, 8):
+        distance = np.linalg.norm(goals - start, axis=1)
+        nearest = goals[np.argmin(distance)]
+        plans = [scene.planner.plan(start, goals, seed) for seed in (1, 2)]
+        if not scene.motions.path_is_verified(np.array([start, nearest])):
+            continue
+        straight += 1
+        for plan in plans:
+            np.testing.assert_array_equal(plan.path, [start, nearest])
+        searched = planner_of(scene).plan(start, goals, 1)
+        assert path_length_rad(searched.path) >= distance.min() - 1e-9
+    assert straight >= 4
+
+
+def test_where_the_straight_motion_is_blocked_the_search_decides():
+    """Between configurations with something in between: as without the motion."""
+    scene = scene_of("ur5-eye-in-hand")
+    start, blocked = scene.scan_configuration, 0
+    rng = np.random.default_rng(4)
+    for q in rng.uniform(scene.robot.lower_rad, scene.robot.upper_rad, (400, 6)):
+        goal = start + 0.5 * (q - start)
+        if not scene.checker.is_free(goal) or scene.motions.is_free(start, goal):
+            continue
+        scene.checker.reset()
+        first = scene.planner.plan(start, goal[None], 5)
+        scene.checker.reset()
+        search = planner_of(scene).plan(start, goal[None], 5)
+        np.testing.assert_array_equal(first.path, search.path)
+        assert first.checks > search.checks
+        blocked += search.path is not None
+        if blocked == 3:
+            return
+    pytest.fail("no blocked straight motion was found")
 
 
 def test_the_unreachable_half_of_the_toy_is_not_reached():
