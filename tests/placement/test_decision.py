@@ -176,7 +176,7 @@ def test_places_that_cannot_be_imaged_are_passed_over():
         high=(0.8, 0.6, 0.7, 0.0),
         keep_scan=False,
     )
-    share = np.full((3, len(Y), len(X)), 0.6)
+    share = np.full((3, len(Y), len(X)), 0.3)
     share[2] = 0.0
     share[2, 4:7, 4:8] = 1.0
     workspace = synthetic_workspace_map(share, x=X, y=Y, z=np.array([0.0, 0.3, 0.7]))

@@ -33,7 +33,12 @@ UR5_CUBES = [
 FEW = [
     f"{scan}.orientations.{name}={value}"
     for scan in ("workspace_scan", "bin_scan")
-    for name, value in (("azimuths", "[1,4]"), ("rolls", "1"))
+    for name, value in (
+        ("tilts_deg", "[0,30]"),
+        ("azimuths", "[1,4]"),
+        ("rolls", "1"),
+        ("roll_offset_deg", "30" if scan == "workspace_scan" else "120"),
+    )
 ]
 UR5 = [*UR5_CUBES, *FEW, "workspace_scan.z_step=0.2", "bin_scan.grid=[4,3]"]
 TOY = [
