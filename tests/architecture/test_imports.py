@@ -29,7 +29,7 @@ HOMES = {
     "coal": ("reachmap.core.",),
     "hppfcl": (),
     "eaik": ("reachmap.core.",),
-    "ompl": ("reachmap.core.planning", "reachmap.core.ompl"),
+    "ompl": ("reachmap.core.ompl_search",),
     "h5py": ("reachmap.maps.",),
     "matplotlib": ("reachmap.plots.",),
     "click": ("reachmap.cli",),

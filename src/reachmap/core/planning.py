@@ -13,27 +13,15 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from ompl import base as ob
-from ompl import geometric as og
-from ompl import util as ou
 
 from reachmap._typing import FloatArray
 from reachmap.cell.planner import PlannerSpec
 from reachmap.core.budget import Budget
 from reachmap.core.motion import MotionChecker
+from reachmap.core.ompl_search import FoundPath, OmplSearch
 from reachmap.core.simplification import shorten
-from reachmap.errors import EngineError
-
-ou.setLogLevel(ou.LogLevel.LOG_NONE)
-
-_OPTIMISING = frozenset(
-    {"RRTstar", "BITstar", "InformedRRTstar", "SORRTstar", "AORRTC"}
-)
-# Their samples are drawn beforehand: begun anew they would have to be connected again.
-_BATCH = frozenset({"FMT", "BFMT"})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -88,6 +76,7 @@ class Planner:
         self.motions = motions
         self.spec = spec
         self._lower, self._upper = lower_rad, upper_rad
+        self._ompl = OmplSearch(motions, lower_rad, upper_rad, spec)
 
     def plan(
         self,
@@ -143,7 +132,7 @@ class Planner:
 
     def _found(
         self, start: FloatArray, goals: FloatArray, seed: int, budget: Budget
-    ) -> Iterator[_Straight | _Search]:
+    ) -> Iterator[_Straight | FoundPath]:
         """Paths at the planning step, until the budget is spent."""
         if not len(goals):
             return
@@ -156,7 +145,7 @@ class Planner:
         allowance = self._first_allowance(budget)
         while not budget.spent():
             budget.begin_search(allowance)
-            search = self._search(start, goals, seeds.spawn(1)[0], budget)
+            search = self._ompl.search(start, goals, seeds.spawn(1)[0], budget)
             if search is not None:
                 yield search
             elif budget.search_interrupted:
@@ -167,83 +156,12 @@ class Planner:
     def _first_allowance(self, budget: Budget) -> int:
         """Checks of the first search, all there are for planners that make one."""
         restart = self.spec.restart_checks
-        if restart is None or self.spec.name in _OPTIMISING | _BATCH:
+        if restart is None or not self._ompl.may_begin_anew:
             return budget.checks
         return restart
 
-    def _search(
-        self,
-        start: FloatArray,
-        goals: FloatArray,
-        seed: np.random.SeedSequence,
-        budget: Budget,
-    ) -> _Search | None:
-        """One run of the OMPL planner, or None without an exact solution."""
-        # The seed is global in OMPL, and acts on what is built after it.
-        ou.RNG.setSeed(int(seed.generate_state(1)[0]) or 1)
-        space = self._space()
-        information = ob.SpaceInformation(space)
-        checker, dof = self.motions.checker, range(len(start))
-        information.setStateValidityChecker(
-            lambda state: checker.is_free(np.array([state[i] for i in dof]))
-        )
-        information.setMotionValidator(_MotionValidator(information, self.motions))
-        information.setup()
-        problem = ob.ProblemDefinition(information)
-        problem.addStartState(_state(information, start))
-        goal = ob.GoalStates(information)
-        for q in goals:
-            goal.addState(_state(information, q))
-        problem.setGoal(goal)
-        if self.spec.name in _OPTIMISING:
-            problem.setOptimizationObjective(
-                ob.PathLengthOptimizationObjective(information)
-            )
-        planner = self._planner(information)
-        planner.setProblemDefinition(problem)
-        planner.setup()
-        planner.solve(ob.PlannerTerminationCondition(budget.search_ends))
-        if not problem.hasExactSolution():
-            return None
-        return _Search(information, problem.getSolutionPath(), len(start))
-
-    def _space(self) -> Any:
-        space = ob.RealVectorStateSpace(len(self._lower))
-        bounds = ob.RealVectorBounds(len(self._lower))
-        for index, (low, high) in enumerate(zip(self._lower, self._upper, strict=True)):
-            bounds.setLow(index, float(low))
-            bounds.setHigh(index, float(high))
-        space.setBounds(bounds)
-        return space
-
-    def _planner(self, information: Any) -> Any:
-        try:
-            planner = getattr(og, self.spec.name)(information)
-        except AttributeError as error:
-            raise EngineError(f"OMPL has no planner {self.spec.name}") from error
-        if self.spec.range_rad is not None and hasattr(planner, "setRange"):
-            planner.setRange(self.spec.range_rad)
-        if self.spec.goal_bias is not None and hasattr(planner, "setGoalBias"):
-            planner.setGoalBias(self.spec.goal_bias)
-        if self.spec.projection_cell_rad and hasattr(planner, "setProjectionEvaluator"):
-            planner.setProjectionEvaluator(
-                self._projection(information, self.spec.projection_cell_rad)
-            )
-        return planner
-
-    def _projection(self, information: Any, cell_rad: float) -> Any:
-        """Coarse cells over the two joints that move the tool furthest.
-
-        A random projection, as OMPL would take, costs three times the checks, and
-        their number depends on luck rather than on the way to the goal.
-        """
-        joints = np.sort(np.argsort(-self.motions.checker.reach_m, kind="stable")[:2])
-        return ob.RealVectorOrthogonalProjectionEvaluator(
-            information.getStateSpace(), [cell_rad] * len(joints), joints.tolist()
-        )
-
     def _shorten_and_verify(
-        self, found: _Straight | _Search, goals: FloatArray, seed: int
+        self, found: _Straight | FoundPath, goals: FloatArray, seed: int
     ) -> FloatArray | None:
         """Shorten at the planning step; where that fails to verify, more carefully."""
         motions, settings = self.motions, self.spec.simplification
@@ -278,38 +196,6 @@ class _Straight:
         return self.path
 
 
-class _Search:
-    """A path as OMPL found it, with the space it lives in."""
-
-    def __init__(self, information: Any, path: Any, dof: int) -> None:
-        self._information, self._path, self._dof = information, path, dof
-
-    def waypoints(self) -> FloatArray:
-        """Way-points, shape (n, dof)."""
-        states = (self._path.getState(row) for row in range(self._path.getStateCount()))
-        return np.array([[state[i] for i in range(self._dof)] for state in states])
-
-    def simplified(self) -> FloatArray:
-        """Way-points after OMPL's own ``simplifyMax``."""
-        og.PathSimplifier(self._information).simplifyMax(self._path)
-        return self.waypoints()
-
-
-class _MotionValidator(ob.MotionValidator):  # type: ignore[misc]
-    """Our definition of a free motion, given to OMPL."""
-
-    def __init__(self, information: Any, motions: MotionChecker) -> None:
-        super().__init__(information)
-        self._is_free = motions.is_free
-        self._dof = range(information.getStateDimension())
-
-    def checkMotion(self, first: Any, second: Any, *_: Any) -> bool:  # noqa: N802
-        return self._is_free(
-            np.array([first[i] for i in self._dof]),
-            np.array([second[i] for i in self._dof]),
-        )
-
-
 class _Clock:
     """Adds up what searching and shortening take."""
 
@@ -330,13 +216,6 @@ class _Clock:
         cpu = time.thread_time()
         self.shortening_cpu_s += cpu - self._cpu
         self._wall, self._cpu = time.perf_counter(), cpu
-
-
-def _state(information: Any, q: FloatArray) -> Any:
-    state = information.allocState()
-    for index, value in enumerate(q):
-        state[index] = float(value)
-    return state
 
 
 def _nearest_row(goals: FloatArray, q: FloatArray) -> int:
