@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future, ProcessPoolExecutor
 from contextlib import contextmanager
 from multiprocessing.connection import Connection
-from typing import ParamSpec, TypeVar
+from typing import Any, ParamSpec, TypeVar
 
 from reachmap.scans.lanes import LaneSpec
 from reachmap.scans.tasks import Parcel, forget
@@ -70,6 +70,11 @@ class WorkerProcess(ProcessPoolExecutor):
         self._reader.close()
         for process in list((self._processes or {}).values()):
             process.kill()  # it has nothing to put in order
+        # A task that was being written when the worker died has no reader; Python
+        # 3.11.2 would wait for it for ever (CPython issue 94777).
+        queue: Any = getattr(self, "_call_queue", None)
+        if queue is not None:
+            queue._reader.close()
         self.shutdown(wait=True, cancel_futures=True)
 
 
