@@ -242,3 +242,11 @@ def test_the_starter_is_refused_by_name_only(tmp_path: Path) -> None:
     assert "no joint that moves" in result.stderr
     with pytest.raises(CellError, match="no such file"):
         read_cell(str(tmp_path / "c.yaml"))
+
+
+def test_a_joint_and_a_link_of_one_name_are_named(tmp_path):
+    """The Z1's fixed joint gripperStator has a link's name; the message says which."""
+    urdf = "package://example-robot-data/robots/z1_description/urdf/z1.urdf"
+    done = run("new-cell", urdf, "-o", str(tmp_path / "z1.yaml"))
+    assert "'gripperStator': names of a joint and of a link" in done.output
+    assert "rename the joint" in done.output

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -168,7 +169,9 @@ def reduced_model(
 
 
 def _why_not_reduced(full: Any, said: str) -> str:
-    shared = [n for n in full.names if full.existFrame(n, pin.FrameType.BODY)]
+    # Fixed joints are frames, too, and no names of the model's joints.
+    names = Counter(frame.name for frame in full.frames)
+    shared = [name for name, count in names.items() if count > 1]
     if not shared:
         return f"robot.urdf: joints cannot be locked ({said})"
     return (
