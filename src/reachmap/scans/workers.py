@@ -9,6 +9,7 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
+import sys
 import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future, ProcessPoolExecutor
@@ -70,12 +71,17 @@ class WorkerProcess(ProcessPoolExecutor):
         self._reader.close()
         for process in list((self._processes or {}).values()):
             process.kill()  # it has nothing to put in order
-        # A task that was being written when the worker died has no reader; Python
-        # 3.11.2 would wait for it for ever (CPython issue 94777).
+        if sys.version_info < (3, 11, 5):
+            self._stop_writing()
+        self.shutdown(wait=True, cancel_futures=True)
+
+    def _stop_writing(self) -> None:
+        # A task that was being written when the worker died has no reader, and the
+        # pool would wait for it for ever (CPython issue 94777). Newer ones close the
+        # pipe themselves; two threads must not.
         queue: Any = getattr(self, "_call_queue", None)
         if queue is not None:
             queue._reader.close()
-        self.shutdown(wait=True, cancel_futures=True)
 
 
 def in_process_lane(parcel: Parcel) -> LaneSpec:
