@@ -23,9 +23,7 @@ from reachmap.scans.survey import survey_frames
 def planner_of(scene, **spec):
     """Planner of a scene with other settings; it searches unless told otherwise."""
     settings = PlannerSpec(**{"straight_first": False, **spec})
-    return Planner(
-        scene.motions, scene.robot.lower_rad, scene.robot.upper_rad, settings
-    )
+    return Planner(scene.motions, settings)
 
 
 def bin_goals(scene, count):

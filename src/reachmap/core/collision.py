@@ -44,6 +44,7 @@ class CollisionChecker:
 
     Attributes
     ----------
+    robot : RobotModel
     body_pairs : tuple of str
         ``"A | B"`` for each different pair of names that is checked.
     proved_pairs : tuple of str
@@ -64,6 +65,7 @@ class CollisionChecker:
         *,
         movable: Collection[str] = (),
     ) -> None:
+        self.robot = robot
         self._model = robot.model
         self._geometry = bodies.geometry
         self._movable = {n: k for k, n in enumerate(bodies.names) if n in movable}

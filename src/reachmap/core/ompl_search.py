@@ -47,19 +47,11 @@ class OmplSearch:
     Parameters
     ----------
     motions : MotionChecker
-    lower_rad, upper_rad : array, shape (dof,)
     spec : PlannerSpec
     """
 
-    def __init__(
-        self,
-        motions: MotionChecker,
-        lower_rad: FloatArray,
-        upper_rad: FloatArray,
-        spec: PlannerSpec,
-    ) -> None:
+    def __init__(self, motions: MotionChecker, spec: PlannerSpec) -> None:
         self._motions, self._spec = motions, spec
-        self._lower, self._upper = lower_rad, upper_rad
 
     @property
     def may_begin_anew(self) -> bool:
@@ -114,9 +106,11 @@ class OmplSearch:
         return FoundPath(information, problem.getSolutionPath(), len(start))
 
     def _space(self) -> Any:
-        space = ob.RealVectorStateSpace(len(self._lower))
-        bounds = ob.RealVectorBounds(len(self._lower))
-        for index, (low, high) in enumerate(zip(self._lower, self._upper, strict=True)):
+        robot = self._motions.checker.robot
+        space = ob.RealVectorStateSpace(robot.dof)
+        bounds = ob.RealVectorBounds(robot.dof)
+        limits = zip(robot.lower_rad, robot.upper_rad, strict=True)
+        for index, (low, high) in enumerate(limits):
             bounds.setLow(index, float(low))
             bounds.setHigh(index, float(high))
         space.setBounds(bounds)

@@ -62,21 +62,13 @@ class Planner:
     Parameters
     ----------
     motions : MotionChecker
-    lower_rad, upper_rad : array, shape (dof,)
     spec : PlannerSpec
     """
 
-    def __init__(
-        self,
-        motions: MotionChecker,
-        lower_rad: FloatArray,
-        upper_rad: FloatArray,
-        spec: PlannerSpec,
-    ) -> None:
+    def __init__(self, motions: MotionChecker, spec: PlannerSpec) -> None:
         self.motions = motions
         self.spec = spec
-        self._lower, self._upper = lower_rad, upper_rad
-        self._ompl = OmplSearch(motions, lower_rad, upper_rad, spec)
+        self._ompl = OmplSearch(motions, spec)
 
     def plan(
         self,
@@ -99,7 +91,8 @@ class Planner:
         max_checks : int, optional
             Budget in state checks; default: the cell's.
         """
-        inside = ((goals >= self._lower) & (goals <= self._upper)).all(axis=1)
+        robot = self.motions.checker.robot
+        inside = ((goals >= robot.lower_rad) & (goals <= robot.upper_rad)).all(axis=1)
         rows = np.flatnonzero(inside)
         goals = goals[rows]
         budget = Budget(

@@ -89,7 +89,7 @@ class Scene:
             kinematics=Kinematics(robot),
             checker=checker,
             motions=motions,
-            planner=Planner(motions, robot.lower_rad, robot.upper_rad, cell.planner),
+            planner=Planner(motions, cell.planner),
             scan_configuration=robot.configuration(
                 loaded.scan_configuration_rad, "scan_configuration"
             ),

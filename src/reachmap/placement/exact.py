@@ -186,9 +186,7 @@ class PlacedScene:
         scene.checker.reset()
         order = np.argsort(goals.frame, kind="stable")
         Q = np.array(goals.q).reshape(-1, scene.robot.dof)[order]
-        planner = Planner(
-            scene.motions, scene.robot.lower_rad, scene.robot.upper_rad, ROADMAP_PLANNER
-        )
+        planner = Planner(scene.motions, ROADMAP_PLANNER)
         frame = np.array(goals.frame, np.int64)[order]
         seed = scene.loaded.cell.seed
         return connect(q, Q, frame, planner, attempts=ATTEMPTS, seed=seed)

@@ -39,9 +39,7 @@ def connect_survey(
     progress = progress or Progress("", quiet=True)
     progress.begin(len(np.unique(survey.frame)))
     scene.checker.reset()
-    planner = Planner(
-        scene.motions, scene.robot.lower_rad, scene.robot.upper_rad, ROADMAP_PLANNER
-    )
+    planner = Planner(scene.motions, ROADMAP_PLANNER)
     connection = connect(
         scene.scan_configuration,
         survey.goals,
