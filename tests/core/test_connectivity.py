@@ -13,7 +13,6 @@ from reachmap.core.planning import Planner
 
 def connection_of(scene, goals, frame, attempts=2, seed=1):
     """Connect goals to the scan configuration of a scene."""
-    scene.checker.reset()
     planner = Planner(scene.motions, ROADMAP_PLANNER)
     return connect(
         scene.scan_configuration, goals, frame, planner, attempts=attempts, seed=seed

@@ -60,10 +60,8 @@ def test_a_seed_is_a_path():
     goals = bin_goals(scene, 1)[0]
     start = scene.scan_configuration
     planner = planner_of(scene)
-    scene.checker.reset()
     first = planner.plan(start, goals, 7)
     planner.plan(start, goals, 8)
-    scene.checker.reset()
     again = planner.plan(start, goals, 7)
     np.testing.assert_array_equal(first.path, again.path)
     assert first.checks == again.checks
@@ -97,9 +95,7 @@ def test_where_the_straight_motion_is_blocked_the_search_decides():
         goal = start + 0.5 * (q - start)
         if not scene.checker.is_free(goal) or scene.motions.is_free(start, goal):
             continue
-        scene.checker.reset()
         first = scene.planner.plan(start, goal[None], 5)
-        scene.checker.reset()
         search = planner_of(scene).plan(start, goal[None], 5)
         np.testing.assert_array_equal(first.path, search.path)
         assert first.checks > search.checks

@@ -228,7 +228,6 @@ def start_of(
         See :meth:`Evaluator.evaluate`.
     """
     checker = placed.scene.checker
-    checker.reset()
     wanted = placed.scene.scan_configuration if q is None else q
     pair = checker.blocking_pair(wanted)
     if pair < 0:

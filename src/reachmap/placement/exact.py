@@ -144,7 +144,6 @@ class PlacedScene:
 
     def _first_goals(self, above: float) -> _Goals:
         """One free approach for each frame that has one, unless too few have."""
-        self.scene.checker.reset()
         goals = _Goals(tried=self._begin[:-1].copy(), bound=self.bound)
         branches = np.diff(self._begin)
         # Those with few branches first: too low a bound shows sooner.
@@ -161,7 +160,6 @@ class PlacedScene:
 
     def _with_other_branches(self, first: _Goals, connection: Connection) -> _Goals:
         """Goals of all branches of the frames that were not reached."""
-        self.scene.checker.reset()
         every = first.copy()
         missed = np.ones(len(self.T), bool)
         missed[connection.roadmap.frames_reached()] = False
@@ -183,7 +181,6 @@ class PlacedScene:
 
     def _connect(self, q: FloatArray, goals: _Goals) -> Connection:
         scene = self.scene
-        scene.checker.reset()
         order = np.argsort(goals.frame, kind="stable")
         Q = np.array(goals.q).reshape(-1, scene.robot.dof)[order]
         planner = Planner(scene.motions, ROADMAP_PLANNER)

@@ -56,7 +56,6 @@ def imaging_configurations(
     """
     cell, T_base_bin = scene.loaded.cell, scene.T_base_bin
     assert cell.camera is not None
-    scene.checker.reset()
     view = view_of(cell.bin.inner, cell.bin_scan.layers)
     camera = Camera(scene.robot, scene.loaded)
     T_bin_camera, missing = _views(cell.bin.inner, cell.bin_scan.layers, cell.camera)

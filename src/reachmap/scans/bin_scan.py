@@ -107,7 +107,6 @@ def plan_grasp(
     connected : bool
         Whether the roadmap proves a path; if not, attempts are short.
     """
-    scene.checker.reset()
     cell = scene.loaded.cell
     goals = survey.goals_of(grasp)
     budget = None if connected else min(CHECKS_UNCONNECTED, cell.planner.max_checks)

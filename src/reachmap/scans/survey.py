@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from reachmap.maps.records import NO_PAIR, Status, freeze
 MAX_COUNT = 255
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)  # no slots: it keeps what it works out
 class Survey:
     """Goals of many test frames.
 
@@ -47,12 +48,12 @@ class Survey:
     def __post_init__(self) -> None:
         freeze(self)
 
-    @property
+    @cached_property
     def way_begin(self) -> IntArray:
         """Row of ``way`` at which each approach begins, shape (goals,)."""
         return np.asarray(np.cumsum(self.way_size) - self.way_size)
 
-    @property
+    @cached_property
     def goals(self) -> FloatArray:
         """Where plans end: pre-grasp configurations, shape (goals, dof)."""
         return self.way[self.way_begin]

@@ -63,7 +63,6 @@ def survey_unit(state: tuple[SurveyContext, Scene], unit: int) -> dict[str, Any]
     """Survey one block of frames."""
     context, scene = state
     grid, block = context.blocks()[unit]
-    scene.checker.reset()
     T = context.grids[grid].transforms_at(block)
     survey = survey_frames(scene, T, context.approach_m)
     return {f.name: getattr(survey, f.name) for f in dataclasses.fields(survey)}

@@ -95,7 +95,6 @@ def plan_frames(
     numbers : sequence of int
         Number of each frame in the scan, which with the cell's seed makes its own.
     """
-    scene.checker.reset()
     cell = scene.loaded.cell
     survey = survey_frames(scene, T_base_tcp, 0.0)
     count, dof = len(T_base_tcp), scene.robot.dof

@@ -38,7 +38,6 @@ def connect_survey(
     """
     progress = progress or Progress("", quiet=True)
     progress.begin(len(np.unique(survey.frame)))
-    scene.checker.reset()
     planner = Planner(scene.motions, ROADMAP_PLANNER)
     connection = connect(
         scene.scan_configuration,

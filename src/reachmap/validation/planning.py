@@ -147,7 +147,6 @@ def plan_pick(
     PickResults
         A single row.
     """
-    scene.checker.reset()
     approach_m = scene.loaded.cell.bin_scan.approach_distance_m
     survey = survey_frames(scene, T_base_tcp, approach_m)
     measured = np.full((1, repeats, len(MEASURED)), np.nan)
