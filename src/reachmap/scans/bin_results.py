@@ -14,17 +14,7 @@ from reachmap.maps import BinMap, PathStore, RunInfo, Stamp, Status
 from reachmap.maps.records import freeze
 from reachmap.sampling.frames import bin_test_frames
 from reachmap.scans.document import provenance_from_document
-
-MEASURED = (
-    "path_length",
-    "path_length_planned",
-    "tcp_path_length",
-    "planning_time",
-    "planning_cpu_time",
-    "simplification_time",
-    "execution_time",
-)
-"""One number per attempt, NaN without a path."""
+from reachmap.scans.measured import MEASURED
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,7 +27,7 @@ class GraspResults:
     blocking_pair : int array, shape (grasps,)
     path_found, hit_time_limit : uint8 array, shape (grasps, repeats)
     measured : array, shape (grasps, repeats, 7)
-        In the order of :data:`MEASURED`.
+        In the order of :data:`~reachmap.scans.measured.MEASURED`.
     goal_configuration : array, shape (grasps, dof)
         Where the shortest path ends [rad].
     configuration : array, shape (points, dof)

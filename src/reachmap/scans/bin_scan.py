@@ -13,15 +13,15 @@ from reachmap._typing import BoolArray, FloatArray
 from reachmap.cell.model import Cell
 from reachmap.core.planning import PlanResult
 from reachmap.core.scene import Scene
-from reachmap.core.timing import (
-    execution_time_s,
-    path_length_rad,
-    polyline_length_m,
-    straight_way_time_s,
-)
 from reachmap.maps import BinMap, RunInfo, Status, write_bin_map
-from reachmap.scans.bin_results import MEASURED, GraspResults, assemble_bin_map
+from reachmap.scans.bin_results import GraspResults, assemble_bin_map
 from reachmap.scans.document import journal_settings
+from reachmap.scans.measured import (
+    MEASURED,
+    MotionNumbers,
+    measured_of,
+    motion_numbers,
+)
 from reachmap.scans.seeds import attempt_seed
 from reachmap.scans.survey import Survey
 from reachmap.scans.work import Kind, Work
@@ -138,15 +138,19 @@ def _results(
     paths: list[FloatArray] = []
     planned: list[int] = []
     place: list[tuple[int, int]] = []
+    known: dict[bytes, MotionNumbers] = {}  # attempts often take the same path
     for repeat, plan in enumerate(plans):
         out_of_time[0, repeat] = plan.hit_time_limit
         if plan.path is None:
             continue
         way = ways[plan.goal]
-        paths.append(np.vstack([plan.path, way[1:]]))
+        whole = np.vstack([plan.path, way[1:]])
+        paths.append(whole)
         planned.append(len(plan.path))
         place.append((0, repeat))
-        measured[0, repeat] = measure_path(scene, plan, way)
+        if (key := whole.tobytes()) not in known:
+            known[key] = motion_numbers(scene, plan.path, way)
+        measured[0, repeat] = measured_of(plan, known[key])
     return GraspResults(
         status=np.array([_status(survey, grasp, plans, connected=connected)], np.uint8),
         n_ik=survey.n_ik[[grasp]],
@@ -162,34 +166,6 @@ def _results(
         planned_size=np.array(planned, np.int64),
         place=np.array(place, np.int64).reshape(-1, 2),
     )
-
-
-def measure_path(scene: Scene, plan: PlanResult, way: FloatArray) -> list[float]:
-    """Numbers of one successful attempt, in the order of ``MEASURED``.
-
-    The execution time counts the planned path, the straight approach and the retreat,
-    which is the approach backwards and takes as long.
-
-    Parameters
-    ----------
-    scene : Scene
-    plan : PlanResult
-        With a path.
-    way : array, shape (n, dof)
-        Straight approach from the end of the path to the grasp.
-    """
-    assert plan.path is not None
-    limits = (scene.robot.velocity_rad_s, scene.robot.acceleration_rad_s2)
-    whole = np.vstack([plan.path, way[1:]])
-    return [
-        path_length_rad(whole),
-        path_length_rad(plan.path),
-        polyline_length_m(scene.tcp_path_points(whole)),
-        plan.planning_time_s,
-        plan.planning_cpu_time_s,
-        plan.simplification_time_s,
-        execution_time_s(plan.path, *limits) + 2 * straight_way_time_s(way, *limits),
-    ]
 
 
 def _status(

@@ -10,7 +10,7 @@ import numpy as np
 
 from reachmap.ranking.ranked_list import status_name
 from reachmap.ranking.table import TERMS
-from reachmap.scans.bin_results import MEASURED
+from reachmap.scans.measured import MEASURED
 from reachmap.validation.judgement import JudgedList
 from reachmap.validation.statistics import Confusion
 from reachmap.validation.summary import (

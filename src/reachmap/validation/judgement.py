@@ -13,7 +13,7 @@ from reachmap.ranking.cost_groups import QUADRANT_ORDER
 from reachmap.ranking.order import OUTSIDE_MAP
 from reachmap.ranking.ranked_list import RankedList
 from reachmap.ranking.ranker import Ranker
-from reachmap.scans.bin_results import MEASURED
+from reachmap.scans.measured import MEASURED
 from reachmap.validation.planning import PickResults
 
 ORDERS = ("supplied", "re-ranked", "ik-only")

@@ -13,8 +13,7 @@ from reachmap._typing import CodeArray, FloatArray, IntArray
 from reachmap.core.planning import PlanResult
 from reachmap.core.scene import Scene
 from reachmap.maps.records import NO_PAIR, Status, freeze
-from reachmap.scans.bin_results import MEASURED
-from reachmap.scans.bin_scan import measure_path
+from reachmap.scans.measured import MEASURED, measured_of, motion_numbers
 from reachmap.scans.parallel import compute_units
 from reachmap.scans.progress import Progress
 from reachmap.scans.seeds import attempt_seed
@@ -55,7 +54,7 @@ class PickResults:
         1 where the first, recommended tool pose is among the latter.
     found : uint8 array, shape (n, r)
     measured : array, shape (n, r, 7)
-        In the order of :data:`reachmap.scans.bin_results.MEASURED`; NaN without path.
+        In the order of :data:`reachmap.scans.measured.MEASURED`; NaN without path.
     pose : int array, shape (n, r)
         Tool pose that was reached, 0 for the recommended one, -1 without a path.
     checks : int array, shape (n, r)
@@ -201,7 +200,9 @@ def _measure(
 ) -> FloatArray:
     """Numbers of a successful attempt; the time of the plan that failed counts."""
     final, goal = plans[-1]
-    measured = np.array(measure_path(scene, final, survey.way_of(goal)))
+    assert final.path is not None
+    motion = motion_numbers(scene, final.path, survey.way_of(goal))
+    measured = np.array(measured_of(final, motion))
     for plan, _ in plans[:-1]:
         measured[MEASURED.index("planning_time")] += plan.planning_time_s
         measured[MEASURED.index("planning_cpu_time")] += plan.planning_cpu_time_s

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from reachmap._typing import FloatArray, IntArray
-from reachmap.scans.bin_results import MEASURED
+from reachmap.scans.measured import MEASURED
 from reachmap.validation.judgement import ORDERS, JudgedList
 from reachmap.validation.statistics import (
     Confusion,
