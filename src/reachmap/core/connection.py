@@ -174,7 +174,6 @@ class _Connector:
 
     def _join_straight(self, label: int) -> bool:
         for goal, node in zip(*self._nearest_pairs(label), strict=True):
-            self._roadmap.motions_checked += 1
             if self._planner.motions.is_verified(self._Q[node], self._Q[goal]):
                 self._roadmap.edges.append((int(node), int(goal)))
                 self._attempts[label] += 1

@@ -124,14 +124,12 @@ class Roadmap:
         Verified straight motions.
     reached : bool array, shape (goals + 1,)
         Nodes connected to the scan configuration.
-    motions_checked : int
     """
 
     configurations: list[FloatArray]
     frame: IntArray
     reached: BoolArray
     edges: list[tuple[int, int]] = field(default_factory=list)
-    motions_checked: int = 0
 
     @classmethod
     def of(cls, start: FloatArray, goals: FloatArray, frame: IntArray) -> Roadmap:
@@ -265,7 +263,6 @@ class Explorer:
             distance, node, before = heapq.heappop(pending)
             if roadmap.reached[node] or self._frame_done[roadmap.frame[node - 1]]:
                 continue
-            roadmap.motions_checked += 1
             if not self._motions.is_verified(self._Q[before], self._Q[node]):
                 continue
             roadmap.edges.append((before, node))
@@ -314,7 +311,6 @@ def components_of_open_goals(
     for a, b in candidates.pairs_among(chosen):
         if sets.find(a) == sets.find(b):
             continue
-        roadmap.motions_checked += 1
         if motions.is_verified(Q[a], Q[b]):
             sets.join(a, b)
             roadmap.edges.append((a, b))

@@ -25,13 +25,11 @@ _PATIENCE = 15
 Step = Callable[[FloatArray, FloatArray], FloatArray]
 
 
-def pose_residual(T_goal: FloatArray, T: FloatArray) -> FloatArray:
-    """How far poses miss their goals, the larger of [m] and [rad], shape (n,)."""
-    return _size(pose_error(T_goal, T))
-
-
 def matrix_difference(T_goal: FloatArray, T: FloatArray) -> FloatArray:
-    """Bound `pose_residual` from above, near zero by less than twice it, shape (n,)."""
+    """Bound how far poses miss their goals, the larger of [m] and [rad], shape (n,).
+
+    From above; near zero by less than twice the miss.
+    """
     difference = (T_goal - T)[:, :3].reshape(len(T), 12)
     # ‖ΔR‖_F = √2 · 2 sin(φ/2); the factor π/(2√2) bounds φ for all angles.
     squares = np.einsum("ni,ni->n", difference, difference)

@@ -32,9 +32,6 @@ class NearestPoints:
         self._points = points
         self._tree: cKDTree | None = None
 
-    def __len__(self) -> int:
-        return len(self._points)
-
     def query(self, points: FloatArray, k: int) -> tuple[FloatArray, IntArray]:
         """Distances [m] and numbers of the k nearest, nearest first, shapes (n, k).
 

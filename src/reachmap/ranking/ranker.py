@@ -172,8 +172,3 @@ class Ranker:
 def _unravelled(matches: Matches, table: GraspTable) -> IntArray:
     place = np.unravel_index(matches.point, table.shape[:3])
     return np.stack([*place, matches.orientation], axis=1)
-
-
-def _canonical(quaternions: FloatArray) -> FloatArray:
-    """Quaternions with w >= 0 and no negative zeros."""
-    return np.where(quaternions[:, :1] < 0, -quaternions, quaternions) + 0.0
