@@ -185,12 +185,13 @@ def output_option(
     help : str, optional
         What is written there, where "Write the result here." is too vague.
     """
+    # A default of None would be a value to Click, and the option never missing.
+    usual = {} if default is None else {"default": default, "show_default": True}
     return _option(
         "-o",
         "--output",
         type=OUTPUT_PATH,
-        default=default,
-        show_default=default is not None,
+        **usual,
         required=required,
         metavar="PATH",
         help=help or "Write the result here.",

@@ -22,6 +22,7 @@ from reachmap.cell.yaml_text import (
     read_bytes,
     read_text,
 )
+from reachmap.disk import is_folder
 from reachmap.errors import CellError
 
 MAX_MESH_BYTES = 100_000_000
@@ -63,7 +64,7 @@ def read_files(document: Document, directory: Path) -> CellFiles:
     named = packages if isinstance(packages, dict) else {}
     folders = {k: v for k, v in named.items() if isinstance(v, str)}
     for name, folder in folders.items():
-        if not (directory / folder).is_dir():
+        if not is_folder(directory / folder):
             document.add(
                 ("resources", "packages", name), f"no such folder: {directory / folder}"
             )

@@ -23,6 +23,7 @@ from reachmap.cell.yaml_text import (
     parse_yaml,
     read_text,
 )
+from reachmap.disk import is_file
 from reachmap.errors import CellError
 
 __all__ = [
@@ -125,11 +126,8 @@ def _find(name_or_path: str) -> Path:
     cells = shipped_cells()
     if name_or_path in cells:
         return cells[name_or_path]
-    try:
-        if path.is_file():
-            return path
-    except (OSError, ValueError):
-        pass
+    if is_file(path):
+        return path
     hint = did_you_mean(name_or_path, tuple(cells))
     raise CellError(f"{name_or_path!r:.120} is no shipped cell and no file; {hint}")
 

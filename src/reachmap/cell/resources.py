@@ -23,6 +23,8 @@ from dataclasses import dataclass, field
 from importlib import metadata, resources
 from pathlib import Path
 
+from reachmap.disk import is_file, is_folder
+
 SCHEME = "package://"
 SHIPPED = "reachmap-cells"
 
@@ -88,7 +90,7 @@ class Resolver:
                 tried.append(folder)
         if name == SHIPPED:
             tried.append(shipped_folder())
-        return [folder for folder in tried if folder.is_dir()], tried
+        return [folder for folder in tried if is_folder(folder)], tried
 
     def resolve(self, reference: str) -> Path:
         """Absolute path of a file named in the cell file; NotFoundError if none."""
@@ -167,11 +169,8 @@ def _existing(reference: str, candidates: list[Path]) -> Path:
     """First candidate that is a file."""
     paths = [_normal(path) for path in candidates]
     for path in paths:
-        try:
-            if path.is_file():
-                return path
-        except (OSError, ValueError):
-            break
+        if is_file(path):
+            return path
     places = ", ".join(str(path) for path in paths)[:4000]
     shown = reference if len(reference) <= 200 else reference[:197] + "…"
     if "\0" in places:

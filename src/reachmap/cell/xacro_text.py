@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from reachmap.cell.resources import Resolver, search_folders
+from reachmap.disk import is_folder
 from reachmap.errors import CellError, MissingExtraError
 
 
@@ -30,7 +31,7 @@ def expand_xacro(path: Path, arguments: Mapping[str, str], resolver: Resolver) -
             "install it with: pip install 'reachmap-cells[xacro]'"
         ) from None
     packages.reset()
-    packages.look_in([str(folder) for folder in search_folders() if folder.is_dir()])
+    packages.look_in([str(folder) for folder in search_folders() if is_folder(folder)])
     packages.update_package_cache(
         {
             name: str(resolver.directory / folder)

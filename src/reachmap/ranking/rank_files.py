@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from reachmap.disk import is_folder
 from reachmap.errors import OutputError, SettingsError
 from reachmap.maps.publish import check_output, publish
 from reachmap.ranking.grasps import STDIN
@@ -32,7 +33,7 @@ def check_targets(
     """
     if output is None:
         return []
-    if output.is_dir() or (len(sources) > 1 and not output.suffix):
+    if is_folder(output) or (len(sources) > 1 and not output.suffix):
         try:
             output.mkdir(parents=True, exist_ok=True)
         except OSError as error:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
 
+from reachmap.disk import is_folder, is_there
 from reachmap.errors import MapFileError, ReachmapError
 from reachmap.maps import (
     artefact_kind,
@@ -96,7 +97,7 @@ class _Reader:
     def artefact(self, role: str, read: Callable[[Path], Read]) -> Read | None:
         kind, usual, command = ARTEFACTS[role]
         path = self.folder / usual
-        if not path.exists():
+        if not is_there(path):
             # Under another name, if there is one of this kind only.
             others = [
                 other
@@ -115,7 +116,7 @@ class _Reader:
     def json(self, role: str) -> Any:
         usual, command = LISTS[role]
         path = self.folder / usual
-        if not path.exists():
+        if not is_there(path):
             self.missing[usual] = command
             return None
         return self._read(role, path, _read_json)
@@ -160,7 +161,7 @@ def read_run_folder(folder: Path) -> RunFolder:
     MapFileError
         It is no folder, or none of its artefacts can be read.
     """
-    if not folder.is_dir():
+    if not is_folder(folder):
         raise MapFileError(f"{folder}: no such folder")
     reader = _Reader(folder)
     workspace = reader.artefact("workspace", read_workspace_map)

@@ -20,6 +20,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from reachmap.disk import is_there
 from reachmap.maps import RunClock, RunInfo, check_output
 from reachmap.scans.crew import Crew
 from reachmap.scans.executors import ExecutorChoice, check_executor, open_lanes
@@ -108,7 +109,7 @@ def run_scan(
     """
     journal = journal_path(output, shard)
     if shard is None:
-        check_output(output, overwrite=overwrite or journal.exists())
+        check_output(output, overwrite=overwrite or is_there(journal))
     clock = RunClock(workers=workers)
     with ExitStack() as stack:
         with clock.phase("units"):

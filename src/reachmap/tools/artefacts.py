@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+from reachmap.disk import is_there
 from reachmap.errors import MapFileError
 from reachmap.maps.any_file import Artefact, read_artefact
 
@@ -40,7 +41,7 @@ def read_artefact_or_journal(path: Path) -> tuple[Artefact, bool]:
 
         return preview(path), False
     journal = path.with_name(f"{path.name}.journal")
-    if not path.exists() and is_journal(journal):
+    if not is_there(path) and is_journal(journal):
         raise MapFileError(
             f"{path}: no such file, but a run towards it is not finished; "
             f"name {journal.name} to look at what is there"
