@@ -42,7 +42,7 @@ test: $(VENV)/.dev ## Run the default test suite
 	$(BIN)/python -m pytest -n $(JOBS)
 
 test-slow: $(VENV)/.dev ## Run the tests that take minutes
-	$(BIN)/python -m pytest -n $(JOBS) -m slow
+	$(BIN)/python -m pytest -n $(JOBS) -m slow --hypothesis-profile=explore
 
 lint: $(VENV)/.dev view ## Format, lint, types, architecture
 	$(BIN)/ruff check .
