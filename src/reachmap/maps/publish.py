@@ -7,6 +7,7 @@ import os
 from collections.abc import Iterable
 from pathlib import Path
 
+from reachmap.disk import real_path
 from reachmap.errors import OutputError
 
 
@@ -29,7 +30,7 @@ def check_output(path: Path, *, overwrite: bool = False) -> Path:
     OutputError
         The file exists, is a folder, or its folder is missing or read-only.
     """
-    target = Path(os.path.realpath(path))
+    target = real_path(path)
     try:
         problem = _obstacle(target, overwrite=overwrite)
     except OSError as error:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from reachmap.disk import is_folder
+from reachmap.disk import is_folder, real_path
 from reachmap.errors import OutputError, SettingsError
 from reachmap.maps.publish import check_output, publish
 from reachmap.ranking.grasps import STDIN
@@ -43,9 +43,9 @@ def check_targets(
         targets = [output]
     if len(set(targets)) < len(targets):
         raise SettingsError("two lists have one name; rank them one after the other")
-    supplied = {Path(source).resolve() for source in sources if str(source) != STDIN}
+    supplied = {real_path(source) for source in sources if str(source) != STDIN}
     for target in targets:
-        if target.resolve() in supplied:
+        if real_path(target) in supplied:
             raise OutputError(f"{target}: would replace the supplied list")
         check_output(target, overwrite=overwrite)
     return targets

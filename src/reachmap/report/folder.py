@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
 
-from reachmap.disk import is_folder, is_there
+from reachmap.disk import is_folder, is_there, real_path
 from reachmap.errors import MapFileError, ReachmapError
 from reachmap.maps import (
     artefact_kind,
@@ -170,7 +170,7 @@ def read_run_folder(folder: Path) -> RunFolder:
     ranked = _ranked_lists(reader)
     validation = _validation(reader)
     run = RunFolder(
-        name=folder.resolve().name,
+        name=real_path(folder).name,
         workspace=workspace,
         placement=placement,
         bin_map=bin_map,

@@ -41,8 +41,8 @@ def journal_path(output: Path, shard: tuple[int, int] | None = None) -> Path:
     'bin.shard-2-of-3.journal'
     """
     if shard is None:
-        return output.with_name(f"{output.name}.journal")
-    return output.with_name(f"{output.stem}.shard-{shard[0]}-of-{shard[1]}.journal")
+        return output.parent / f"{output.name}.journal"
+    return output.parent / f"{output.stem}.shard-{shard[0]}-of-{shard[1]}.journal"
 
 
 class Journal:

@@ -151,6 +151,10 @@ def read_journal(path: Path) -> Iterator[Entries]:
     except OSError as error:
         raise MapFileError(f"{path}: {error.strerror}") from error
     try:
-        yield Entries(path, descriptor)
+        try:
+            entries = Entries(path, descriptor)
+        except OSError as error:  # a folder opens, and cannot be read
+            raise MapFileError(f"{path}: {error.strerror}") from error
+        yield entries
     finally:
         os.close(descriptor)

@@ -40,7 +40,7 @@ def read_artefact_or_journal(path: Path) -> tuple[Artefact, bool]:
         from reachmap.scans.results import preview
 
         return preview(path), False
-    journal = path.with_name(f"{path.name}.journal")
+    journal = path.parent / f"{path.name}.journal"
     if not is_there(path) and is_journal(journal):
         raise MapFileError(
             f"{path}: no such file, but a run towards it is not finished; "

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from reachmap.core.scene import Scene
+from reachmap.disk import real_path
 from reachmap.errors import GraspListError, SettingsError
 from reachmap.maps import read_bin_map
 from reachmap.maps.publish import check_output, publish
@@ -211,11 +212,11 @@ def _check_places(
     """Refuse places before an hour of planning is spent."""
     if chart is not None and chart.suffix not in CHART_SUFFIXES:
         raise SettingsError(f"{chart}: a chart is a .png or an .svg")
-    inputs = {Path(source).resolve() for source in (*sources, map_path)}
+    inputs = {real_path(source) for source in (*sources, map_path)}
     for target in (output, chart):
         if target is None:
             continue
-        if target.resolve() in inputs:
+        if real_path(target) in inputs:
             raise SettingsError(f"{target}: would replace an input")
         check_output(target, overwrite=overwrite)
     if output is not None and chart is not None and output == chart:
