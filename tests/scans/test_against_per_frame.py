@@ -10,7 +10,7 @@ from scenes import scene_of
 from reachmap.core.simplification import shorten
 from reachmap.maps import Status
 from reachmap.sampling.frames import bin_test_frames, workspace_frames
-from reachmap.scans.bin_scan import plan_grasp
+from reachmap.scans.bin_scan import plan_grasps
 from reachmap.scans.survey import survey_frames
 from reachmap.scans.workspace_per_frame import plan_frames
 from reachmap.scans.workspace_roadmap import connect_survey, path_to_frame
@@ -65,9 +65,12 @@ def test_another_seed_reaches_the_same_test_grasps():
         scene, grid.transforms_at(rows), cell.bin_scan.approach_distance_m
     )
     disputed = 0
-    for k in range(len(rows)):
-        first = plan_grasp(scene, survey, k, connected=True)
-        second = plan_grasp(other, survey, k, connected=True)
+    every, connected = range(len(rows)), np.ones(len(rows), bool)
+    for first, second in zip(
+        plan_grasps(scene, survey, every, connected),
+        plan_grasps(other, survey, every, connected),
+        strict=True,
+    ):
         if first.path_found.any() != second.path_found.any():
             assert not first.path_found.all()
             disputed += 1

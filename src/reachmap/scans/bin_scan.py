@@ -29,7 +29,7 @@ from reachmap.scans.work import Kind, Work
 if TYPE_CHECKING:
     from reachmap.cell.loading import LoadedCell
 
-GRASPS_PER_UNIT = 9
+GRASPS_PER_UNIT = 45
 CHECKS_UNCONNECTED = 1_000
 """Budget of an attempt at a grasp that the roadmap could not connect."""
 
@@ -84,43 +84,52 @@ def plan_unit(state: tuple[BinContext, Scene], unit: int) -> dict[str, Any]:
     context, scene = state
     begin = unit * GRASPS_PER_UNIT
     grasps = range(begin, min(begin + GRASPS_PER_UNIT, len(context.survey.status)))
-    parts = [
-        plan_grasp(
-            scene, context.survey, grasp, connected=bool(context.connected[grasp])
-        )
-        for grasp in grasps
-    ]
+    parts = plan_grasps(scene, context.survey, grasps, context.connected[grasps])
     return dataclasses.asdict(GraspResults.join(parts))
 
 
-def plan_grasp(
-    scene: Scene, survey: Survey, grasp: int, *, connected: bool
-) -> GraspResults:
-    """Make all attempts at one test grasp.
+def plan_grasps(
+    scene: Scene, survey: Survey, grasps: Sequence[int], connected: BoolArray
+) -> list[GraspResults]:
+    """Make all attempts at some test grasps.
+
+    They take turns: a machine that is slow for a moment is then slow for one attempt
+    at each of many, and not for every attempt at one, which would look dear.
 
     Parameters
     ----------
     scene : Scene
     survey : Survey
-    grasp : int
-        Its number in the survey, which with the cell's seed makes its own.
-    connected : bool
+    grasps : sequence of int
+        Their numbers in the survey, which with the cell's seed make their own.
+    connected : bool array, shape (len(grasps),)
         Whether the roadmap proves a path; if not, attempts are short.
     """
-    cell = scene.loaded.cell
-    goals = survey.goals_of(grasp)
-    budget = None if connected else min(CHECKS_UNCONNECTED, cell.planner.max_checks)
-    plans = [
-        scene.planner.plan(
-            scene.scan_configuration,
-            survey.goals[goals],
-            attempt_seed(cell.seed, grasp, repeat),
-            max_checks=budget,
-        )
-        for repeat in range(cell.bin_scan.repeats if len(goals) else 0)
+    plans: list[list[PlanResult]] = [[] for _ in grasps]
+    for repeat in range(scene.loaded.cell.bin_scan.repeats):
+        for row, grasp in enumerate(grasps):
+            goals = survey.goals[survey.goals_of(grasp)]
+            if len(goals):
+                plan = _attempt(scene, goals, grasp, repeat, bool(connected[row]))
+                plans[row].append(plan)
+    return [
+        _results(scene, survey, grasp, plans[row], connected=bool(connected[row]))
+        for row, grasp in enumerate(grasps)
     ]
-    ways = [survey.way_of(int(goal)) for goal in goals]
-    return _results(scene, survey, grasp, plans, ways, connected=connected)
+
+
+def _attempt(
+    scene: Scene, goals: FloatArray, grasp: int, repeat: int, connected: bool
+) -> PlanResult:
+    cell = scene.loaded.cell
+    return scene.planner.plan(
+        scene.scan_configuration,
+        goals,
+        attempt_seed(cell.seed, grasp, repeat),
+        max_checks=None
+        if connected
+        else min(CHECKS_UNCONNECTED, cell.planner.max_checks),
+    )
 
 
 def _results(
@@ -128,11 +137,11 @@ def _results(
     survey: Survey,
     grasp: int,
     plans: Sequence[PlanResult],
-    ways: Sequence[FloatArray],
     *,
     connected: bool,
 ) -> GraspResults:
     repeats = scene.loaded.cell.bin_scan.repeats
+    goals = survey.goals_of(grasp)
     measured = np.full((1, repeats, len(MEASURED)), np.nan)
     out_of_time = np.zeros((1, repeats), np.uint8)
     paths: list[FloatArray] = []
@@ -143,7 +152,7 @@ def _results(
         out_of_time[0, repeat] = plan.hit_time_limit
         if plan.path is None:
             continue
-        way = ways[plan.goal]
+        way = survey.way_of(int(goals[plan.goal]))
         whole = np.vstack([plan.path, way[1:]])
         paths.append(whole)
         planned.append(len(plan.path))

@@ -153,7 +153,7 @@ def read_journal(path: Path) -> Iterator[Entries]:
     try:
         try:
             entries = Entries(path, descriptor)
-        except OSError as error:  # a folder opens, and cannot be read
+        except IsADirectoryError as error:  # it opens, and cannot be read
             raise MapFileError(f"{path}: {error.strerror}") from error
         yield entries
     finally:

@@ -14,7 +14,7 @@ from reachmap.cell.loading import read_cell
 from reachmap.core.scene import Scene
 from reachmap.maps import BinMap, Status, read_placement, read_workspace_map
 from reachmap.sampling.frames import FrameGrid, bin_test_frames
-from reachmap.scans.bin_scan import CHECKS_UNCONNECTED, bin_work, plan_grasp
+from reachmap.scans.bin_scan import CHECKS_UNCONNECTED, bin_work, plan_grasps
 from reachmap.scans.document import checking_settings, roadmap_settings, scan_document
 from reachmap.scans.progress import Progress
 from reachmap.scans.run import run_scan
@@ -155,8 +155,7 @@ def estimate_bin_scan(
     survey = survey_frames(
         scene, grid.transforms_at(rows), loaded.cell.bin_scan.approach_distance_m
     )
-    for row in range(len(rows)):
-        plan_grasp(scene, survey, row, connected=True)
+    plan_grasps(scene, survey, range(len(rows)), np.ones(len(rows), bool))
     seconds = (time.perf_counter() - begin) / len(rows) * grid.size
     return {
         "cell": loaded.cell.name,
