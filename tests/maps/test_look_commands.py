@@ -15,7 +15,12 @@ from synthetic_maps import (
 )
 
 from reachmap.cli import group
-from reachmap.maps import write_bin_map, write_placement, write_workspace_map
+from reachmap.maps import (
+    read_bin_map,
+    write_bin_map,
+    write_placement,
+    write_workspace_map,
+)
 from reachmap.plots import files, style
 
 
@@ -77,8 +82,12 @@ def test_info_of_a_bin_map(folder: Path) -> None:
     assert "2        6  12  50.00  25.38 to 74.62" in text
     assert "2 test grasps proved connected but missed by every attempt; with" in text
     assert "the limit on wall-clock time ended 1 attempt" in text
-    assert "planning time (CPU)" in text
     assert "  NE       3        0.0" in text
+    times = read_bin_map(folder / "bin.h5").planning_cpu_time
+    row = next(line for line in text.splitlines() if "planning time (CPU)" in line)
+    unit, mean = row.removeprefix("  planning time (CPU)").split()[:2]
+    assert unit == "ms"  # stored in seconds, of which they are a fraction
+    assert float(mean) == pytest.approx(1e3 * np.nanmean(times), rel=0.01)
 
 
 def test_info_of_a_placement(folder: Path) -> None:

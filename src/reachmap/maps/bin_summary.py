@@ -16,16 +16,33 @@ from reachmap.maps.statistics import (
     saturation_of,
 )
 
-MEASURES: dict[str, tuple[str, str]] = {
-    "path_length": ("path length", "rad"),
-    "path_length_planned": ("planned part of it", "rad"),
-    "tcp_path_length": ("TCP path length", "m"),
-    "planning_cpu_time": ("planning time (CPU)", "s"),
-    "planning_time": ("planning time (wall)", "s"),
-    "simplification_time": ("simplification time", "s"),
-    "execution_time": ("execution time", "s"),
+
+@dataclass(frozen=True, slots=True)
+class Shown:
+    """How a measured variable is shown to people.
+
+    Attributes
+    ----------
+    words, unit : str
+    scale : float
+        Units in one SI unit, in which variables are stored.
+    """
+
+    words: str
+    unit: str
+    scale: float = 1.0
+
+
+MEASURES: dict[str, Shown] = {
+    "path_length": Shown("path length", "rad"),
+    "path_length_planned": Shown("planned part of it", "rad"),
+    "tcp_path_length": Shown("TCP path length", "m"),
+    "planning_cpu_time": Shown("planning time (CPU)", "ms", 1e3),
+    "planning_time": Shown("planning time (wall)", "ms", 1e3),
+    "simplification_time": Shown("simplification time", "ms", 1e3),
+    "execution_time": Shown("execution time", "s"),
 }
-"""Measured variables, in words and with their units."""
+"""Measured variables, as tables show them."""
 
 QUADRANTS = ("NE", "NW", "SE", "SW")
 

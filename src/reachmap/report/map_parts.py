@@ -223,7 +223,7 @@ def _quadrant_table(summary: BinSummary) -> Html:
                     percent(float(found.share[-1])),
                     interval(float(found.low[-1]), float(found.high[-1])),
                     number(measures["path_length"].mean, 2),
-                    number(1e3 * measures["planning_cpu_time"].mean, 0),
+                    number(1e3 * measures["planning_cpu_time"].mean, 2),
                     number(measures["execution_time"].mean, 2),
                 )
             )
@@ -234,9 +234,10 @@ def _quadrant_table(summary: BinSummary) -> Html:
 
 def _measure_table(summary: BinSummary) -> Html:
     rows = []
-    for name, (words, unit) in MEASURES.items():
+    for name, shown in MEASURES.items():
         spread = summary.measures[name]
         if spread.count:
             values = (spread.mean, spread.std, spread.low, spread.median, spread.high)
-            rows.append((f"{words} [{unit}]", *(number(v, 3) for v in values)))
+            numbers = (number(shown.scale * value, 3) for value in values)
+            rows.append((f"{shown.words} [{shown.unit}]", *numbers))
     return table(("", "mean", "std", "least", "median", "most"), rows, "<>>>>>")

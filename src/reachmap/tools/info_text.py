@@ -179,29 +179,30 @@ def _beyond_lines(summary: BinSummary) -> list[str]:
 def _measure_lines(measures: Mapping[str, Spread]) -> list[str]:
     rows = [["", "unit", "mean", "± spread", "least", "median", "most"]]
     for name, spread in measures.items():
-        words, unit = MEASURES[name]
+        shown = MEASURES[name]
         values = (spread.mean, spread.std, spread.low, spread.median, spread.high)
-        rows.append([words, unit, *(_number(value) for value in values)])
+        numbers = (_number(shown.scale * value) for value in values)
+        rows.append([shown.words, shown.unit, *numbers])
     return table_lines(rows, "<<>>>>>")
 
 
 def _quadrant_lines(summary: BinSummary) -> list[str]:
     last = f"after {summary.repeats} %"
-    rows = [["", "grasps", "after 1 %", last, "path [rad]", "planning [s]",
+    rows = [["", "grasps", "after 1 %", last, "path [rad]", "planning [ms]",
              "execution [s]"]]  # fmt: skip
     for quadrant in summary.quadrants:
         s: Saturation = quadrant.saturation
-        spreads = (
-            quadrant.measures[name]
+        spreads = [
+            (MEASURES[name].scale, quadrant.measures[name])
             for name in ("path_length", "planning_cpu_time", "execution_time")
-        )
+        ]
         rows.append(
             [
                 quadrant.name,
                 str(s.total),
                 percent_text(s.share[0]),
                 percent_text(s.share[-1]),
-                *(f"{_number(a.mean)} ± {_number(a.std)}" for a in spreads),
+                *(f"{_number(k * a.mean)} ± {_number(k * a.std)}" for k, a in spreads),
             ]
         )
     return table_lines(rows, "<>>>>>>")
