@@ -130,7 +130,7 @@ class CollisionChecker:
         data = geometry.createData()
         for request, margin in zip(data.collisionRequests, margins, strict=True):
             request.security_margin = float(margin)
-            _guess_nothing(request)
+        _guess_nothing(data.collisionRequests)
         # The naive manager is the fastest on a cell; the sweep-and-prune one misses
         # collisions (reference: 75 of 10,500).
         manager = pin.BroadPhaseManager_NaiveCollisionManager(
@@ -190,7 +190,7 @@ class CollisionChecker:
         return min(candidates, key=len)[0] if candidates else _NO_PAIR
 
 
-def _guess_nothing(request: Any) -> None:
+def _guess_nothing(requests: Any) -> None:
     """Let checks begin from nothing that an earlier one has left.
 
     Its guess would change answers in the last digits, and saves no time that could be
@@ -199,7 +199,8 @@ def _guess_nothing(request: Any) -> None:
     with warnings.catch_warnings():
         # The setting that coal has in its place acts beside this one, not instead.
         warnings.simplefilter("ignore", DeprecationWarning)
-        request.enable_cached_gjk_guess = False
+        for request in requests:
+            request.enable_cached_gjk_guess = False
 
 
 def _margin_shares(
