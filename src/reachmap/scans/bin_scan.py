@@ -16,12 +16,7 @@ from reachmap.core.scene import Scene
 from reachmap.maps import BinMap, RunInfo, Status, write_bin_map
 from reachmap.scans.bin_results import GraspResults, assemble_bin_map
 from reachmap.scans.document import journal_settings
-from reachmap.scans.measured import (
-    MEASURED,
-    MotionNumbers,
-    measured_of,
-    motion_numbers,
-)
+from reachmap.scans.measured import MEASURED, Meter
 from reachmap.scans.seeds import attempt_seed
 from reachmap.scans.survey import Survey
 from reachmap.scans.work import Kind, Work
@@ -105,12 +100,12 @@ def plan_grasps(
     connected : bool array, shape (len(grasps),)
         Whether the roadmap proves a path; if not, attempts are short.
     """
+    goals = [survey.goals[survey.goals_of(grasp)] for grasp in grasps]
     plans: list[list[PlanResult]] = [[] for _ in grasps]
     for repeat in range(scene.loaded.cell.bin_scan.repeats):
         for row, grasp in enumerate(grasps):
-            goals = survey.goals[survey.goals_of(grasp)]
-            if len(goals):
-                plan = _attempt(scene, goals, grasp, repeat, bool(connected[row]))
+            if len(goals[row]):
+                plan = _attempt(scene, goals[row], grasp, repeat, bool(connected[row]))
                 plans[row].append(plan)
     return [
         _results(scene, survey, grasp, plans[row], connected=bool(connected[row]))
@@ -147,19 +142,16 @@ def _results(
     paths: list[FloatArray] = []
     planned: list[int] = []
     place: list[tuple[int, int]] = []
-    known: dict[bytes, MotionNumbers] = {}  # attempts often take the same path
+    meter = Meter(scene)
     for repeat, plan in enumerate(plans):
         out_of_time[0, repeat] = plan.hit_time_limit
         if plan.path is None:
             continue
         way = survey.way_of(int(goals[plan.goal]))
-        whole = np.vstack([plan.path, way[1:]])
-        paths.append(whole)
+        paths.append(np.vstack([plan.path, way[1:]]))
         planned.append(len(plan.path))
         place.append((0, repeat))
-        if (key := whole.tobytes()) not in known:
-            known[key] = motion_numbers(scene, plan.path, way)
-        measured[0, repeat] = measured_of(plan, known[key])
+        measured[0, repeat] = meter.measured(plan, way)
     return GraspResults(
         status=np.array([_status(survey, grasp, plans, connected=connected)], np.uint8),
         n_ik=survey.n_ik[[grasp]],

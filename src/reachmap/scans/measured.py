@@ -31,8 +31,58 @@ MEASURED = (
 """One number per attempt, NaN without a path."""
 
 
+class Meter:
+    """Measures attempts; a path that several of them take is measured once.
+
+    Parameters
+    ----------
+    scene : Scene
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        self._scene = scene
+        self._known: dict[bytes, _MotionNumbers] = {}
+
+    def measured(self, plan: PlanResult, way: FloatArray) -> list[float]:
+        """Numbers of one successful attempt, in the order of ``MEASURED``.
+
+        Parameters
+        ----------
+        plan : PlanResult
+            With a path.
+        way : array, shape (n, dof)
+            Straight approach from the end of the path to the grasp.
+        """
+        assert plan.path is not None
+        key = plan.path.tobytes() + way.tobytes()
+        if key not in self._known:
+            self._known[key] = self._numbers(plan.path, way)
+        motion = self._known[key]
+        return [
+            motion.path_length_rad,
+            motion.planned_length_rad,
+            motion.tcp_length_m,
+            plan.planning_time_s,
+            plan.planning_cpu_time_s,
+            plan.simplification_time_s,
+            motion.execution_time_s,
+        ]
+
+    def _numbers(self, path: FloatArray, way: FloatArray) -> _MotionNumbers:
+        robot = self._scene.robot
+        limits = (robot.velocity_rad_s, robot.acceleration_rad_s2)
+        whole = np.vstack([path, way[1:]])
+        return _MotionNumbers(
+            path_length_rad=path_length_rad(whole),
+            planned_length_rad=path_length_rad(path),
+            tcp_length_m=polyline_length_m(self._scene.tcp_path_points(whole)),
+            execution_time_s=execution_time_s(path, *limits)
+            + 2 * straight_way_time_s(way, *limits),
+        )
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
-class MotionNumbers:
+class _MotionNumbers:
     """What a path takes, whoever planned it.
 
     Attributes
@@ -50,38 +100,3 @@ class MotionNumbers:
     planned_length_rad: float
     tcp_length_m: float
     execution_time_s: float
-
-
-def motion_numbers(scene: Scene, path: FloatArray, way: FloatArray) -> MotionNumbers:
-    """Lengths of a planned path and the approach that follows it, and their time.
-
-    Parameters
-    ----------
-    scene : Scene
-    path : array, shape (m, dof)
-        Ends where ``way`` begins.
-    way : array, shape (n, dof)
-        Straight approach to the grasp.
-    """
-    limits = (scene.robot.velocity_rad_s, scene.robot.acceleration_rad_s2)
-    whole = np.vstack([path, way[1:]])
-    return MotionNumbers(
-        path_length_rad=path_length_rad(whole),
-        planned_length_rad=path_length_rad(path),
-        tcp_length_m=polyline_length_m(scene.tcp_path_points(whole)),
-        execution_time_s=execution_time_s(path, *limits)
-        + 2 * straight_way_time_s(way, *limits),
-    )
-
-
-def measured_of(plan: PlanResult, motion: MotionNumbers) -> list[float]:
-    """Numbers of one successful attempt, in the order of ``MEASURED``."""
-    return [
-        motion.path_length_rad,
-        motion.planned_length_rad,
-        motion.tcp_length_m,
-        plan.planning_time_s,
-        plan.planning_cpu_time_s,
-        plan.simplification_time_s,
-        motion.execution_time_s,
-    ]

@@ -13,7 +13,7 @@ from reachmap._typing import CodeArray, FloatArray, IntArray
 from reachmap.core.planning import PlanResult
 from reachmap.core.scene import Scene
 from reachmap.maps.records import NO_PAIR, Status, freeze
-from reachmap.scans.measured import MEASURED, measured_of, motion_numbers
+from reachmap.scans.measured import MEASURED, Meter
 from reachmap.scans.parallel import compute_units
 from reachmap.scans.progress import Progress
 from reachmap.scans.seeds import attempt_seed
@@ -148,6 +148,7 @@ def plan_pick(
     """
     approach_m = scene.loaded.cell.bin_scan.approach_distance_m
     survey = survey_frames(scene, T_base_tcp, approach_m)
+    meter = Meter(scene)
     measured = np.full((1, repeats, len(MEASURED)), np.nan)
     pose = np.full((1, repeats), -1)
     checks, hit_time_limit = np.zeros_like(pose), np.zeros(pose.shape, np.uint8)
@@ -156,7 +157,7 @@ def plan_pick(
         checks[0, k] = sum(plan.checks for plan, _ in plans)
         hit_time_limit[0, k] = any(plan.hit_time_limit for plan, _ in plans)
         if plans and plans[-1][1] >= 0:
-            measured[0, k] = _measure(scene, survey, plans)
+            measured[0, k] = _measure(meter, survey, plans)
             pose[0, k] = survey.frame[plans[-1][1]]
     status, pair = _verdict(survey, found=bool((pose >= 0).any()))
     free = np.unique(survey.frame)
@@ -196,13 +197,11 @@ def _attempt(
 
 
 def _measure(
-    scene: Scene, survey: Survey, plans: Sequence[tuple[PlanResult, int]]
+    meter: Meter, survey: Survey, plans: Sequence[tuple[PlanResult, int]]
 ) -> FloatArray:
     """Numbers of a successful attempt; the time of the plan that failed counts."""
     final, goal = plans[-1]
-    assert final.path is not None
-    motion = motion_numbers(scene, final.path, survey.way_of(goal))
-    measured = np.array(measured_of(final, motion))
+    measured = np.array(meter.measured(final, survey.way_of(goal)))
     for plan, _ in plans[:-1]:
         measured[MEASURED.index("planning_time")] += plan.planning_time_s
         measured[MEASURED.index("planning_cpu_time")] += plan.planning_cpu_time_s
