@@ -32,6 +32,17 @@ class Shown:
     unit: str
     scale: float = 1.0
 
+    def of(self, spread: Spread) -> Spread:
+        """Turn a measure from SI units into the unit shown."""
+        return Spread(
+            count=spread.count,
+            mean=self.scale * spread.mean,
+            std=self.scale * spread.std,
+            low=self.scale * spread.low,
+            median=self.scale * spread.median,
+            high=self.scale * spread.high,
+        )
+
 
 MEASURES: dict[str, Shown] = {
     "path_length": Shown("path length", "rad"),

@@ -216,6 +216,7 @@ def _quadrant_table(summary: BinSummary) -> Html:
         (element("b", "whole bin"), summary.saturation, summary.measures),
     ]:
         if found.total:
+            planning = MEASURES["planning_cpu_time"].of(measures["planning_cpu_time"])
             rows.append(
                 (
                     name,
@@ -223,7 +224,7 @@ def _quadrant_table(summary: BinSummary) -> Html:
                     percent(float(found.share[-1])),
                     interval(float(found.low[-1]), float(found.high[-1])),
                     number(measures["path_length"].mean, 2),
-                    number(1e3 * measures["planning_cpu_time"].mean, 2),
+                    number(planning.mean, 2),
                     number(measures["execution_time"].mean, 2),
                 )
             )
@@ -235,9 +236,9 @@ def _quadrant_table(summary: BinSummary) -> Html:
 def _measure_table(summary: BinSummary) -> Html:
     rows = []
     for name, shown in MEASURES.items():
-        spread = summary.measures[name]
+        spread = shown.of(summary.measures[name])
         if spread.count:
             values = (spread.mean, spread.std, spread.low, spread.median, spread.high)
-            numbers = (number(shown.scale * value, 3) for value in values)
+            numbers = (number(value, 3) for value in values)
             rows.append((f"{shown.words} [{shown.unit}]", *numbers))
     return table(("", "mean", "std", "least", "median", "most"), rows, "<>>>>>")

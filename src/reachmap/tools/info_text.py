@@ -178,11 +178,11 @@ def _beyond_lines(summary: BinSummary) -> list[str]:
 
 def _measure_lines(measures: Mapping[str, Spread]) -> list[str]:
     rows = [["", "unit", "mean", "± spread", "least", "median", "most"]]
-    for name, spread in measures.items():
+    for name, measure in measures.items():
         shown = MEASURES[name]
+        spread = shown.of(measure)
         values = (spread.mean, spread.std, spread.low, spread.median, spread.high)
-        numbers = (_number(shown.scale * value) for value in values)
-        rows.append([shown.words, shown.unit, *numbers])
+        rows.append([shown.words, shown.unit, *(_number(value) for value in values)])
     return table_lines(rows, "<<>>>>>")
 
 
@@ -192,17 +192,17 @@ def _quadrant_lines(summary: BinSummary) -> list[str]:
              "execution [s]"]]  # fmt: skip
     for quadrant in summary.quadrants:
         s: Saturation = quadrant.saturation
-        spreads = [
-            (MEASURES[name].scale, quadrant.measures[name])
+        spreads = (
+            MEASURES[name].of(quadrant.measures[name])
             for name in ("path_length", "planning_cpu_time", "execution_time")
-        ]
+        )
         rows.append(
             [
                 quadrant.name,
                 str(s.total),
                 percent_text(s.share[0]),
                 percent_text(s.share[-1]),
-                *(f"{_number(k * a.mean)} ± {_number(k * a.std)}" for k, a in spreads),
+                *(f"{_number(a.mean)} ± {_number(a.std)}" for a in spreads),
             ]
         )
     return table_lines(rows, "<>>>>>>")
