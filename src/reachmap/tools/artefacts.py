@@ -8,6 +8,7 @@ from pathlib import Path
 from reachmap.disk import is_there
 from reachmap.errors import MapFileError
 from reachmap.maps.any_file import Artefact, read_artefact
+from reachmap.scans.journal import journal_path
 
 _JOURNAL = re.compile(rb'[0-9a-f]{8} \{"format":"reachmap\.journal"')
 
@@ -40,7 +41,7 @@ def read_artefact_or_journal(path: Path) -> tuple[Artefact, bool]:
         from reachmap.scans.results import preview
 
         return preview(path), False
-    journal = path.parent / f"{path.name}.journal"
+    journal = journal_path(path)
     if not is_there(path) and is_journal(journal):
         raise MapFileError(
             f"{path}: no such file, but a run towards it is not finished; "
