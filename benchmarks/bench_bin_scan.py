@@ -23,11 +23,11 @@ from ompl import util as ou
 
 from reachmap._typing import FloatArray
 from reachmap.cell.loading import read_cell
-from reachmap.core.bodies import build_geometry
+from reachmap.core.collision.bodies import build_geometry
+from reachmap.core.planning.timing import path_length_rad
 from reachmap.core.scene import Scene
-from reachmap.core.timing import path_length_rad
 from reachmap.sampling.frames import bin_test_frames
-from reachmap.scans.survey import Survey, survey_frames
+from reachmap.scans.ik_survey import Survey, survey_frames
 
 CELL = "ur5-eye-in-hand"
 SAMPLE = 60

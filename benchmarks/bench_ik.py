@@ -13,9 +13,9 @@ import numpy as np
 
 from reachmap._typing import FloatArray
 from reachmap.cell.loading import read_cell
-from reachmap.cell.model import IkSpec
-from reachmap.core.kinematics import Kinematics
-from reachmap.core.robot import RobotModel
+from reachmap.cell.model.cell import IkSpec
+from reachmap.core.kinematics.kinematics import Kinematics
+from reachmap.core.robot.model import RobotModel
 from reachmap.geometry import rotation_from_rpy_deg, transform_from_parts
 
 

@@ -19,17 +19,17 @@ import numpy as np
 
 from reachmap._typing import FloatArray
 from reachmap.cell.loading import LoadedCell
-from reachmap.core.bin_fit import BinFit
-from reachmap.core.robot import RobotModel
+from reachmap.core.collision.bin_fit import BinFit
+from reachmap.core.robot.model import RobotModel
 from reachmap.core.scene import Scene
 from reachmap.geometry import yaw_transform
 from reachmap.maps import BinPlacement, Status, read_placement, read_workspace_map
-from reachmap.placement.evaluator import Evaluation, open_evaluator
-from reachmap.placement.exact import PlacedScene, Pose
-from reachmap.placement.imaging import imaging_configurations
-from reachmap.placement.region import Region, region_of
-from reachmap.placement.sample import THIN, Grid, open_frames, sample_of
-from reachmap.scans.progress import Progress
+from reachmap.placement.mapped.evaluator import Evaluation, open_evaluator
+from reachmap.placement.mapped.exact import PlacedScene, Pose
+from reachmap.placement.mapped.imaging import imaging_configurations
+from reachmap.placement.mapped.sample import THIN, Grid, open_frames, sample_of
+from reachmap.placement.predicted.region import Region, region_of
+from reachmap.runtime.progress import Progress
 from reachmap.tools.bin_scan import bin_scan
 from reachmap.tools.options import RunOptions, cell_of_artefact
 from reachmap.tools.place_bin import PlacementChoice, place_bin

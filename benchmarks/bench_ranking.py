@@ -19,13 +19,12 @@ from pathlib import Path
 import numpy as np
 
 ROOT = Path(__file__).parents[1]
-sys.path.insert(0, str(ROOT / "tests" / "support"))
-
-from ranking_maps import make_bin_map  # noqa: E402
-from ranking_oracle import Oracle  # noqa: E402
+sys.path.insert(0, str(ROOT))
 
 from reachmap.maps import read_bin_map, write_bin_map  # noqa: E402
 from reachmap.ranking import Ranker  # noqa: E402
+from tests.support.ranking_maps import make_bin_map  # noqa: E402
+from tests.support.ranking_oracle import Oracle  # noqa: E402
 
 SIZES = (1, 50, 200, 1000, 10_000)
 LIMITS_MS = {50: 1.0, 10_000: 100.0}

@@ -15,9 +15,9 @@ import numpy as np
 
 from reachmap.cell.loading import read_cell
 from reachmap.core.scene import Scene
+from reachmap.runtime.progress import Progress
 from reachmap.sampling.frames import workspace_frames
-from reachmap.scans.progress import Progress
-from reachmap.scans.survey_run import SurveyContext, run_survey
+from reachmap.scans.ik_survey import SurveyContext, run_survey
 from reachmap.scans.workspace_per_frame import plan_frames
 from reachmap.scans.workspace_roadmap import connect_survey, results_of_connection
 

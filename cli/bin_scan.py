@@ -8,7 +8,6 @@ from pathlib import Path
 
 import click
 
-from reachmap.cli.answers import facts_text
 from reachmap.cli.options import (
     DEFAULT_CELL,
     INPUT_FILE,
@@ -16,6 +15,7 @@ from reachmap.cli.options import (
     output_option,
     scan_options,
 )
+from reachmap.cli.text.tables import facts_text
 
 log = logging.getLogger(__name__)
 

@@ -70,8 +70,8 @@ def command(
 
     Example: reachmap compare bin.h5 slim/bin.h5 --fail-under -0.5
     """
+    from reachmap.cli.text.compare import compare_text
     from reachmap.tools.compare import compare, draw
-    from reachmap.tools.compare_text import compare_text
 
     found = compare(
         before,

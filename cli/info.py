@@ -24,8 +24,8 @@ def command(artefact: Path, as_json: bool) -> None:
 
     Example: reachmap info bin.h5
     """
+    from reachmap.cli.text.info import info_text
     from reachmap.tools.info import info
-    from reachmap.tools.info_text import info_text
 
     found = info(artefact)
     click.echo(json.dumps(found.facts()) if as_json else info_text(found))

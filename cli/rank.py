@@ -8,7 +8,7 @@ from typing import Literal
 import click
 
 from reachmap.cli import options
-from reachmap.cli.ranking_options import list_options
+from reachmap.cli.options import list_options
 
 AXES = ("+x", "-x", "+y", "-y", "+z", "-z")
 
@@ -97,7 +97,8 @@ def command(
       network | reachmap rank - --top 10 | robot
       reachmap rank grasps.json --explain NW-12
     """
-    from reachmap.ranking.settings import RankSettings
+    from reachmap.cli.text.rank import ranking_tables
+    from reachmap.ranking.lookup.settings import RankSettings
     from reachmap.tools.rank import ListFormat, rank
 
     to_stdout = output is None or str(output) == "-"
@@ -123,5 +124,7 @@ def command(
         chart_top=chart_top,
         overwrite=overwrite,
     )
-    text = answer.explanation or (answer.text if to_stdout else answer.table)
+    text = answer.explanation or (
+        answer.text if to_stdout else ranking_tables(answer.ranked, top)
+    )
     click.echo(text.rstrip("\n"))

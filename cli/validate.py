@@ -9,7 +9,7 @@ from typing import Literal
 import click
 
 from reachmap.cli import options
-from reachmap.cli.ranking_options import list_options
+from reachmap.cli.options import list_options
 
 
 @click.command("validate")
@@ -93,7 +93,8 @@ def command(
       reachmap validate bin.h5 grasps.json --chart validation.png
       reachmap validate bin.h5 --random 500 -o results.json
     """
-    from reachmap.ranking.settings import RankSettings
+    from reachmap.cli.text.validate import validation_text
+    from reachmap.ranking.lookup.settings import RankSettings
     from reachmap.tools.options import RunOptions
     from reachmap.tools.rank import ListFormat
     from reachmap.tools.validate import PickOptions, validate
@@ -117,4 +118,6 @@ def command(
             quiet=not progress,
         ),
     )
-    click.echo(json.dumps(answer.facts) if as_json else answer.text)
+    click.echo(
+        json.dumps(answer.facts) if as_json else validation_text(answer.validation)
+    )

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import click
 
-from reachmap.cli.answers import facts_text
 from reachmap.cli.options import cell_argument, output_option, scan_options
+from reachmap.cli.text.tables import facts_text
 
 
 @click.command()

@@ -20,7 +20,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 from sphinx.util.docutils import SphinxDirective
 
-from reachmap.cell.model import Cell
+from reachmap.cell.model.cell import Cell
 
 BOUNDS = {"gt": ">", "ge": "≥", "lt": "<", "le": "≤"}
 NAMES = {

@@ -35,7 +35,7 @@ def test_cells_lists_what_is_shipped() -> None:
 
 def test_listing_does_not_need_the_robots(monkeypatch: pytest.MonkeyPatch) -> None:
     """It works where the meshes are not installed."""
-    monkeypatch.setattr("reachmap.cell.resources.data_folder", lambda: None)
+    monkeypatch.setattr("reachmap.cell.files.resources.data_folder", lambda: None)
     assert run("cells").exit_code == 0
 
 

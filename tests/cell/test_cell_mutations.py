@@ -11,9 +11,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from reachmap.cell.files.resources import shipped_folder
 from reachmap.cell.loading import LoadedCell, cell_from_json, cell_from_text
-from reachmap.cell.resources import shipped_folder
-from reachmap.cell.yaml_text import parse_yaml
+from reachmap.cell.text.yaml_reader import parse_yaml
 from reachmap.errors import CellError
 
 FOLDER = shipped_folder()

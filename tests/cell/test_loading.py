@@ -18,7 +18,7 @@ from reachmap.cell.loading import (
     shipped_cells,
     stored_cell,
 )
-from reachmap.cell.yaml_writer import cell_yaml
+from reachmap.cell.text.yaml_writer import cell_yaml
 from reachmap.errors import CellError
 from reachmap.geometry import transform_from_parts, yaw_transform
 

@@ -9,9 +9,9 @@ from pathlib import Path
 import click
 import pytest
 
-from reachmap.cell.model import Cell
+from reachmap.cell.model.cell import Cell
 from reachmap.cli import group
-from reachmap.cli.table import COMMANDS
+from reachmap.cli.group import COMMANDS
 from reachmap.errors import ReachmapError
 
 ROOT = Path(__file__).parents[2]

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from reachmap.cli.table import COMMANDS
+from reachmap.cli.group import COMMANDS
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"

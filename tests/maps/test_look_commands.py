@@ -8,11 +8,6 @@ from typing import Any
 import numpy as np
 import pytest
 from click.testing import CliRunner, Result
-from synthetic_maps import (
-    synthetic_bin_map,
-    synthetic_placement,
-    synthetic_workspace_map,
-)
 
 from reachmap.cli import group
 from reachmap.maps import (
@@ -21,7 +16,12 @@ from reachmap.maps import (
     write_placement,
     write_workspace_map,
 )
-from reachmap.plots import files, style
+from reachmap.plots.parts import files, style
+from tests.support.synthetic_maps import (
+    synthetic_bin_map,
+    synthetic_placement,
+    synthetic_workspace_map,
+)
 
 
 def run(*words: Any) -> Result:

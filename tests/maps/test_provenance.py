@@ -7,7 +7,6 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
-from synthetic_maps import synthetic_provenance, synthetic_run
 
 from reachmap.errors import MapFileError
 from reachmap.maps import RunClock, collect_provenance
@@ -18,6 +17,7 @@ from reachmap.maps.provenance import (
     run_from_texts,
     run_texts,
 )
+from tests.support.synthetic_maps import synthetic_provenance, synthetic_run
 
 
 def test_the_clock_adds_up_phases() -> None:

@@ -8,10 +8,10 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from command_line import reachmap
 
-from reachmap.maps.any_file import read_artefact
+from reachmap.maps.format.registry import read_artefact
 from reachmap.maps.records import BinMap, Status, WorkspaceMap
+from tests.support.command_line import reachmap
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "pile-2.json"
 SMALL = (

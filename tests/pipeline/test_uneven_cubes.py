@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 
-from command_line import reachmap
+from tests.support.command_line import reachmap
 
 CUBES = (
     "[{name: a, min: [0.2, -0.4, 0], max: [0.6, 0, 0], grid: [2, 2]},"

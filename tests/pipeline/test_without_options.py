@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 
-from command_line import reachmap
+from tests.support.command_line import reachmap
 
 
 def test_bin_scan_takes_the_cell_of_the_workspace_map(tmp_path):

@@ -7,9 +7,9 @@ import shutil
 import subprocess
 
 import pytest
-from command_line import reachmap
 
 from reachmap.cell.loading import shipped_cells
+from tests.support.command_line import reachmap
 
 
 def refused(result: subprocess.CompletedProcess[str], *words: str) -> list[str]:

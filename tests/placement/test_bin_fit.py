@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scenes import scene_of
 
-from reachmap.core.bin_fit import BinFit
+from reachmap.core.collision.bin_fit import BinFit
 from reachmap.core.scene import Scene
 from reachmap.errors import SceneError
 from reachmap.geometry import yaw_transform
+from tests.support.scenes import scene_of
 
 UR5 = "ur5-eye-in-hand"
 SCENE = scene_of(UR5, with_bin=False)

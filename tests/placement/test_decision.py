@@ -6,20 +6,24 @@ import dataclasses
 
 import numpy as np
 import pytest
-from closed_form_evaluator import ClosedForm
-from scenes import scene_of
-from synthetic_maps import synthetic_workspace_map
 
-from reachmap.core.bin_fit import BinFit
+from reachmap.core.collision.bin_fit import BinFit
 from reachmap.core.scene import Scene
 from reachmap.errors import SceneError
-from reachmap.placement.decision import decide_as_given, decide_by_paper, paper_pose
-from reachmap.placement.outcome import settle
-from reachmap.placement.places import apart_m
-from reachmap.placement.question import Question
-from reachmap.placement.region import Region
-from reachmap.placement.sample import open_frames
+from reachmap.placement.decision import (
+    decide_as_given,
+    decide_by_paper,
+    paper_pose,
+    settle,
+)
+from reachmap.placement.mapped.sample import open_frames
+from reachmap.placement.predicted.places import apart_m
+from reachmap.placement.predicted.region import Region
+from reachmap.placement.problem import Question
 from reachmap.placement.search import decide_by_search
+from tests.support.closed_form_evaluator import ClosedForm
+from tests.support.scenes import scene_of
+from tests.support.synthetic_maps import synthetic_workspace_map
 
 UR5 = "ur5-eye-in-hand"
 SCENE = scene_of(UR5, with_bin=False)

@@ -8,17 +8,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from reachmap.cell.loading import read_cell
-from reachmap.core.robot import RobotModel
+from reachmap.core.robot.model import RobotModel
 from reachmap.core.scene import Scene
 from reachmap.geometry import yaw_transform
-from reachmap.placement.evaluator import (
+from reachmap.placement.mapped.evaluator import (
     numbers_of_unit,
     open_evaluator,
     unit_of_numbers,
 )
-from reachmap.placement.imaging import UNSEEN
-from reachmap.placement.sample import frames_in_bin, open_frames
-from reachmap.scans.progress import Progress
+from reachmap.placement.mapped.imaging import UNSEEN
+from reachmap.placement.mapped.sample import frames_in_bin, open_frames
+from reachmap.runtime.progress import Progress
 
 # Six points, all around; nothing of the approach but the branches of the kinematics.
 SMALL = ("bin_scan.grid=[3,2]", "bin_scan.approach_distance_m=0.02")

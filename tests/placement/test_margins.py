@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from closed_form_evaluator import ClosedForm
 from hypothesis import given
 from hypothesis import strategies as st
 
 from reachmap.placement.margins import (
     DROP_POINTS,
-    MOST_POSES,
+    MARGIN_POSES,
     SHIFTS_M,
     TURNS_RAD,
     margins,
 )
+from tests.support.closed_form_evaluator import ClosedForm
 
 POSE = (0.5, 0.1, 0.0, np.pi / 2)
 Q = np.zeros(6)
@@ -53,7 +53,7 @@ def test_cliffs_at_known_distances(limits):
     for name, limit in zip(DIRECTIONS, limits, strict=True):
         ladder = TURNS_RAD if "yaw" in name else SHIFTS_M
         assert found[name] == pytest.approx(rung(limit + 1e-9, ladder))
-    assert len(evaluator.asked) <= MOST_POSES
+    assert len(evaluator.asked) <= MARGIN_POSES
 
 
 def test_a_slope_of_known_steepness():

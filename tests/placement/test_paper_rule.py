@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
-from synthetic_maps import synthetic_workspace_map
 
 from reachmap.placement.paper_rule import (
     LatticePoint,
@@ -14,6 +13,7 @@ from reachmap.placement.paper_rule import (
     patch_means,
     points_in_order,
 )
+from tests.support.synthetic_maps import synthetic_workspace_map
 
 
 def best_by_loops(percent, blocked):

@@ -9,8 +9,6 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from click.testing import CliRunner
-from dense_checks import dense_free
-from pinhole import corners_of, sees
 from ruamel.yaml import YAML
 
 from reachmap.cell.loading import read_cell
@@ -20,6 +18,8 @@ from reachmap.geometry import yaw_transform
 from reachmap.maps import read_bin_map, read_placement
 from reachmap.tools.options import cell_of_artefact
 from reachmap.tools.workspace_scan import workspace_scan
+from tests.support.dense_checks import dense_free
+from tests.support.pinhole import corners_of, sees
 
 UR5_CUBES = [
     f"workspace_scan.cubes.{k}.{name}={value}"

@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from reachmap.placement.candidates import Candidate, CandidateTable
-from reachmap.placement.exact import PoseScore
-from reachmap.placement.places import apart_m, pose_grid, rank_key, spread_out
-from reachmap.placement.region import Region
+from reachmap.placement.mapped.candidates import Candidate, CandidateTable
+from reachmap.placement.mapped.exact import PoseScore
+from reachmap.placement.predicted.places import apart_m, pose_grid, rank_key, spread_out
+from reachmap.placement.predicted.region import Region
 
 
 def candidate(pose, score, worst=50.0, length=1.0):

@@ -11,14 +11,23 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import RegularGridInterpolator
 from scipy.spatial.transform import Rotation
-from synthetic_maps import synthetic_workspace_map
 
 from reachmap.errors import MapFileError
-from reachmap.placement.field import ReachField, field_of, linear_weights
-from reachmap.placement.footprint import Footprint
-from reachmap.placement.places import best_at_each_place, pose_grid, spread_out
-from reachmap.placement.prediction import PoseGrid, predict
-from reachmap.placement.region import Region
+from reachmap.placement.predicted.places import (
+    best_at_each_place,
+    pose_grid,
+    spread_out,
+)
+from reachmap.placement.predicted.prediction import (
+    Footprint,
+    PoseGrid,
+    ReachField,
+    field_of,
+    linear_weights,
+    predict,
+)
+from reachmap.placement.predicted.region import Region
+from tests.support.synthetic_maps import synthetic_workspace_map
 
 DOWN = Rotation.from_euler("x", 180, degrees=True)
 

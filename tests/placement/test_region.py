@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from reachmap.cell.scan_specs import PlacementSpec
+from reachmap.cell.model.scans import PlacementSpec
 from reachmap.errors import SettingsError
-from reachmap.placement.region import AXES, region_of
+from reachmap.placement.predicted.region import AXES, region_of
 
 LATTICE = {
     "x": np.linspace(0.0, 1.0, 11),

@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scenes import scene_of
 
 from reachmap.cell.loading import read_cell
-from reachmap.placement.footprint import footprint_of
-from reachmap.placement.sample import (
+from reachmap.placement.mapped.sample import (
     COARSE,
     frames_in_bin,
     open_frames,
     sample_of,
     spread_indices,
 )
+from reachmap.placement.predicted.prediction import footprint_of
+from tests.support.scenes import scene_of
 
 UR5 = "ur5-eye-in-hand"
 

@@ -6,22 +6,22 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from pinhole import corners_of, sees
-from scenes import scene_of
 from scipy.spatial.transform import Rotation
 
 from reachmap.cell.loading import read_cell
 from reachmap.core.scene import Scene
-from reachmap.placement.exact import PlacedScene
-from reachmap.placement.imaging import can_choose, imaging_configurations
-from reachmap.placement.sample import THIN, open_frames, sample_of
-from reachmap.placement.viewpoints import (
+from reachmap.placement.mapped.exact import PlacedScene
+from reachmap.placement.mapped.imaging import can_choose, imaging_configurations
+from reachmap.placement.mapped.sample import THIN, open_frames, sample_of
+from reachmap.placement.mapped.viewpoints import (
     NOT_SEEN,
     camera_poses,
     picture_corners,
     seen_from,
     view_of,
 )
+from tests.support.pinhole import corners_of, sees
+from tests.support.scenes import scene_of
 
 UR5 = "ur5-eye-in-hand"
 CELL = read_cell(UR5).cell

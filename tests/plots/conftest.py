@@ -7,4 +7,4 @@ import pytest
 
 @pytest.fixture(autouse=True)
 def _coarse_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("reachmap.plots.style.DPI", 50)
+    monkeypatch.setattr("reachmap.plots.parts.style.DPI", 50)

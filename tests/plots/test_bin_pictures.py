@@ -7,24 +7,24 @@ from collections import Counter
 import numpy as np
 import pytest
 from scipy.stats import binomtest
-from synthetic_maps import (
+
+from reachmap.cell.model.orientations import ConeFamily
+from reachmap.geometry import yaw_transform
+from reachmap.maps.records import Status
+from reachmap.plots.approach import STATUS_COLOURS, draw_approach, sunburst_sectors
+from reachmap.plots.bin_map import draw_costs, draw_reachability
+from reachmap.plots.causes import causes_of, draw_causes
+from reachmap.plots.parts.bin_view import percent_after
+from reachmap.plots.parts.squares import percent_text
+from reachmap.plots.placement import draw_placement, placement_words
+from reachmap.plots.saturation import draw_saturation, saturation_of, wilson_interval
+from reachmap.sampling.orientations import approach_directions, orientation_set
+from tests.support.synthetic_maps import (
     statuses,
     synthetic_bin_map,
     synthetic_placement,
     synthetic_workspace_map,
 )
-
-from reachmap.cell.orientations import ConeFamily
-from reachmap.geometry import yaw_transform
-from reachmap.maps.records import Status
-from reachmap.plots.approach import STATUS_COLOURS, draw_approach, sunburst_sectors
-from reachmap.plots.bin_map import draw_costs, draw_reachability
-from reachmap.plots.bin_view import percent_after
-from reachmap.plots.causes import causes_of, draw_causes
-from reachmap.plots.placement import draw_placement, placement_words
-from reachmap.plots.saturation import draw_saturation, saturation_of, wilson_interval
-from reachmap.plots.squares import percent_text
-from reachmap.sampling.orientations import approach_directions, orientation_set
 
 CONE = ConeFamily(tilts_deg=(0.0, 30.0), azimuths=(1, 8), rolls=3)
 

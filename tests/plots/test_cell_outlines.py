@@ -7,15 +7,20 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from synthetic_maps import cell_json, synthetic_provenance
 
-from reachmap.cell.fields import Shape
 from reachmap.cell.loading import read_cell
-from reachmap.cell.model import BinSpec, BodySpec, Cell
+from reachmap.cell.model.cell import BinSpec, BodySpec, Cell
+from reachmap.cell.model.fields import Shape
 from reachmap.geometry import yaw_transform
-from reachmap.plots.base import base_outline, read_stl_points
-from reachmap.plots.context import context_of, patch_shape
-from reachmap.plots.outlines import bin_outlines, body_outlines, shape_points
+from reachmap.plots.parts.context import context_of, patch_shape
+from reachmap.plots.parts.outlines import (
+    base_outline,
+    bin_outlines,
+    body_outlines,
+    read_stl_points,
+    shape_points,
+)
+from tests.support.synthetic_maps import cell_json, synthetic_provenance
 
 CELL = Cell.model_validate_json(cell_json())
 

@@ -9,12 +9,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner, Result
-from synthetic_maps import (
-    synthetic_bin_map,
-    synthetic_placement,
-    synthetic_provenance,
-    synthetic_workspace_map,
-)
 
 from reachmap.cli import group
 from reachmap.maps import (
@@ -22,6 +16,12 @@ from reachmap.maps import (
     write_bin_map,
     write_placement,
     write_workspace_map,
+)
+from tests.support.synthetic_maps import (
+    synthetic_bin_map,
+    synthetic_placement,
+    synthetic_provenance,
+    synthetic_workspace_map,
 )
 
 PNG = b"\x89PNG\r\n\x1a\n"
@@ -39,7 +39,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 @pytest.fixture
 def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
     """Leave the drawing out where only files and names matter."""
-    monkeypatch.setattr("reachmap.plots.files.figure_bytes", lambda *a, **k: PNG)
+    monkeypatch.setattr("reachmap.plots.parts.files.figure_bytes", lambda *a, **k: PNG)
     for name in ("level", "overview", "reachability", "costs", "approach",
                  "saturation", "causes", "placement"):  # fmt: skip
         monkeypatch.setattr(f"reachmap.plots.albums.draw_{name}", lambda *a, **k: None)

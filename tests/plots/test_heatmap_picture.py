@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from synthetic_maps import frames_from_fraction, statuses, synthetic_workspace_map
 
 from reachmap.maps.records import Status, WorkspaceMap
 from reachmap.plots.heatmap import best_frames, draw_level
-from reachmap.plots.levels import (
+from reachmap.plots.overview import draw_overview
+from reachmap.plots.parts.levels import (
     QUANTITIES,
     best_level,
     best_patch,
@@ -21,9 +21,18 @@ from reachmap.plots.levels import (
     level_names,
     quantity_values,
 )
-from reachmap.plots.overview import draw_overview
-from reachmap.plots.squares import cell_edges, number_size, percent_text, signed_text
-from reachmap.plots.stack import level_subtitle, level_title, stack_of
+from reachmap.plots.parts.squares import (
+    cell_edges,
+    number_size,
+    percent_text,
+    signed_text,
+)
+from reachmap.plots.parts.stack import level_subtitle, level_title, stack_of
+from tests.support.synthetic_maps import (
+    frames_from_fraction,
+    statuses,
+    synthetic_workspace_map,
+)
 
 RED, GREEN, GREY = (165, 0, 38), (0, 104, 55), (211, 211, 211)
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from matplotlib.path import Path
 
-from reachmap.plots.numbers import number_place
+from reachmap.plots.parts.squares import number_place
 
 SQUARE = np.array([[0.0, 0.0], [0.2, 0.2]])
 TEXT = {"font_size": 8.0, "scale_in": 4.0}

@@ -15,7 +15,7 @@ import pytest
 from matplotlib.figure import Figure
 from PIL import Image
 
-from reachmap.plots.style import (
+from reachmap.plots.parts.style import (
     CHANGE_MAP,
     COST_MAP,
     DIFFERENCE_MAP,
@@ -117,9 +117,10 @@ def test_drawing_needs_neither_pyplot_nor_a_display() -> None:
     code = """
         import sys
         import numpy as np
-        from synthetic_maps import synthetic_bin_map, synthetic_workspace_map
+        from tests.support.synthetic_maps import synthetic_bin_map
+        from tests.support.synthetic_maps import synthetic_workspace_map
         from reachmap.plots.albums import bin_album, workspace_album
-        from reachmap.plots.style import figure_bytes
+        from reachmap.plots.parts.style import figure_bytes
         items = workspace_album(synthetic_workspace_map(np.eye(3)[None]), ["path"])
         items += bin_album(synthetic_bin_map(shape=(1, 2, 2, 4, 2)))
         for item in items:

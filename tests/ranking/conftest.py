@@ -6,9 +6,9 @@ import json
 from pathlib import Path
 
 import pytest
-from ranking_maps import make_bin_map
 
 from reachmap.maps import write_bin_map
+from tests.support.ranking_maps import make_bin_map
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 

@@ -7,15 +7,15 @@ import logging
 
 import numpy as np
 import pytest
-from ranking_maps import make_bin_map
 
 from reachmap.cell.loading import read_cell
 from reachmap.errors import MapFileError
 from reachmap.geometry import yaw_transform
 from reachmap.maps import write_bin_map
 from reachmap.maps.records import Provenance
-from reachmap.ranking.cell_check import differing_sections
+from reachmap.ranking.answers.cell_check import differing_sections
 from reachmap.tools.rank import rank
+from tests.support.ranking_maps import make_bin_map
 
 CELL = "ur5-eye-in-hand"
 

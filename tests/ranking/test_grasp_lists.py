@@ -14,8 +14,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from reachmap.errors import GraspListError
-from reachmap.ranking.grasps import grasps_from_document, read_grasps
-from reachmap.ranking.json_text import lines_of, parse_json
+from reachmap.ranking.lists.json_text import lines_of, parse_json
+from reachmap.ranking.lists.reading import grasps_from_document, read_grasps
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 SCHEMA = json.loads(

@@ -11,7 +11,7 @@ import pytest
 
 from reachmap.errors import GraspListError, SettingsError
 from reachmap.geometry import rotation_from_rpy_deg
-from reachmap.ranking.grasps import read_grasps
+from reachmap.ranking.lists.reading import read_grasps
 
 R = rotation_from_rpy_deg(np.array([10.0, 20.0, 130.0]))
 ISAAC = """

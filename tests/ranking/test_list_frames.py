@@ -6,7 +6,6 @@ import dataclasses
 
 import numpy as np
 import pytest
-from ranking_maps import make_bin_map
 from scipy.spatial.transform import Rotation
 
 from reachmap.errors import GraspListError, MapFileError, SettingsError
@@ -17,9 +16,10 @@ from reachmap.geometry import (
     yaw_transform,
 )
 from reachmap.maps.records import Provenance
-from reachmap.ranking.frames import frames_of, place_grasps
-from reachmap.ranking.grasps import grasps_from_document
-from reachmap.ranking.pipeline import pose_from_numbers
+from reachmap.ranking.answers.pipeline import pose_from_numbers
+from reachmap.ranking.lists.reading import grasps_from_document
+from reachmap.ranking.lookup.frames import frames_of, place_grasps
+from tests.support.ranking_maps import make_bin_map
 
 BIN_MAP = make_bin_map()
 FRAMES = frames_of(BIN_MAP)

@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ranking_maps import make_bin_map
 
 from reachmap.errors import GraspListError
 from reachmap.ranking import (
@@ -19,7 +18,8 @@ from reachmap.ranking import (
     rank_list,
     ranked_document,
 )
-from reachmap.ranking.grasps import read_grasps
+from reachmap.ranking.lists.reading import read_grasps
+from tests.support.ranking_maps import make_bin_map
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 RANKER = Ranker(make_bin_map(shape=(1, 2, 3)))

@@ -7,7 +7,7 @@ import sys
 
 import numpy as np
 
-from reachmap.ranking.nearest import FEW_PAIRS, NearestPoints
+from reachmap.ranking.lookup.matching import FEW_PAIRS, NearestPoints
 
 
 def test_few_and_many_are_answered_alike():

@@ -12,7 +12,7 @@ import pytest
 from click.testing import CliRunner
 
 from reachmap.cli import group
-from reachmap.ranking.importers import FORMATS
+from reachmap.ranking.lists.importers import FORMATS
 
 HEAVY = ("pinocchio", "coal", "ompl", "eaik", "matplotlib", "pydantic", "viser")
 

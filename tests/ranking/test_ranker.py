@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from ranking_maps import make_bin_map
 from scipy.spatial.transform import Rotation
 
 from reachmap.errors import MapFileError, SettingsError
@@ -20,10 +19,11 @@ from reachmap.geometry import (
 )
 from reachmap.maps.records import Status
 from reachmap.ranking import OUTSIDE_MAP, Ranker, align, rotation_between
-from reachmap.ranking.approach import axis_vector, tcp_rotation
-from reachmap.ranking.costs import outside_map
-from reachmap.ranking.order import stable_order
-from reachmap.ranking.table import quaternion_angle
+from reachmap.ranking.lookup.approach import axis_vector, tcp_rotation
+from reachmap.ranking.lookup.costs import outside_map
+from reachmap.ranking.lookup.order import stable_order
+from reachmap.ranking.lookup.table import quaternion_angle
+from tests.support.ranking_maps import make_bin_map
 
 BIN_MAP = make_bin_map(seed=7, reachable=0.6)
 RANKER = Ranker(BIN_MAP)

@@ -7,12 +7,12 @@ from unittest import mock
 
 import numpy as np
 import pytest
-from ranking_maps import make_bin_map
-from ranking_oracle import Oracle
 from scipy.spatial.transform import Rotation
 
-from reachmap.cell.orientations import ConeFamily
-from reachmap.ranking.ranker import Ranker
+from reachmap.cell.model.orientations import ConeFamily
+from reachmap.ranking.lookup.ranker import Ranker
+from tests.support.ranking_maps import make_bin_map
+from tests.support.ranking_oracle import Oracle
 
 
 def wobbled(bin_map):
@@ -89,5 +89,5 @@ def test_rankings_agree_with_the_loops(roll, part):
 
 def _without_outside(ranker, p, weights, **given):
     nowhere = np.zeros(len(p), bool)
-    with mock.patch("reachmap.ranking.ranker.outside_map", return_value=nowhere):
+    with mock.patch("reachmap.ranking.lookup.ranker.outside_map", return_value=nowhere):
         return ranker.rank(p, weights=weights, **given)

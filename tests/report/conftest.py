@@ -9,12 +9,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from synthetic_maps import (
-    synthetic_bin_map,
-    synthetic_placement,
-    synthetic_provenance,
-    synthetic_workspace_map,
-)
 
 from reachmap.maps import (
     read_placement,
@@ -24,6 +18,12 @@ from reachmap.maps import (
     write_workspace_map,
 )
 from reachmap.tools.rank import rank
+from tests.support.synthetic_maps import (
+    synthetic_bin_map,
+    synthetic_placement,
+    synthetic_provenance,
+    synthetic_workspace_map,
+)
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 SHARE = {"hits": 97, "total": 100, "share": 0.97, "low": 0.92, "high": 0.99}

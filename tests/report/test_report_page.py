@@ -11,13 +11,13 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner, Result
-from synthetic_maps import synthetic_bin_map, synthetic_provenance
-from toy_artefacts import toy_bin_map, toy_workspace
 
 from reachmap.cli import group
 from reachmap.maps import write_bin_map, write_workspace_map
-from reachmap.maps.statistics import saturation_of
+from reachmap.maps.summary.statistics import saturation_of
 from reachmap.report.page import CONTENTS
+from tests.support.synthetic_maps import synthetic_bin_map, synthetic_provenance
+from tests.support.toy_artefacts import toy_bin_map, toy_workspace
 
 DRAWINGS = {
     "map_parts": ("draw_level", "draw_overview", "draw_placement", "draw_approach",
@@ -107,14 +107,14 @@ def leave_drawing_out(patch: pytest.MonkeyPatch) -> None:
         for name in names:
             patch.setattr(f"reachmap.report.{part}.{name}", lambda *a, **k: None)
     patch.setattr(
-        "reachmap.report.drawing.figure_bytes", lambda *a, **k: b"\x89PNG" + bytes(20)
+        "reachmap.report.markup.figure_bytes", lambda *a, **k: b"\x89PNG" + bytes(20)
     )
 
 
 def draw_coarsely(patch: pytest.MonkeyPatch) -> None:
     """Pixels are most of the time."""
-    patch.setattr("reachmap.plots.style.DPI", 40)
-    patch.setattr("reachmap.plots.cell_view.PIXELS_PER_IN", 20.0)
+    patch.setattr("reachmap.plots.parts.style.DPI", 40)
+    patch.setattr("reachmap.plots.cell.cell_view.PIXELS_PER_IN", 20.0)
 
 
 def test_a_finished_run_has_every_section(finished_page: str) -> None:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from reachmap.cell.model import BinScanSpec, BinSpec, CubeSpec, WorkspaceScanSpec
+from reachmap.cell.model.cell import BinScanSpec, BinSpec, CubeSpec, WorkspaceScanSpec
 from reachmap.geometry import yaw_transform
 from reachmap.sampling.frames import bin_test_frames, cell_centres, workspace_frames
 

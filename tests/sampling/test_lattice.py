@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from reachmap.cell.model import CubeSpec
+from reachmap.cell.model.cell import CubeSpec
 from reachmap.sampling.lattice import (
     Lattice,
     axis_coordinates,

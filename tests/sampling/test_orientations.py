@@ -6,9 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from reachmap.cell.loading import read_cell
-from reachmap.cell.orientations import ConeFamily, ListFamily
+from reachmap.cell.model.orientations import ConeFamily, ListFamily
 from reachmap.geometry import rotation_angle, rotation_from_rpy_deg
-from reachmap.ranking.approach import align
+from reachmap.ranking.lookup.approach import align
 from reachmap.sampling.orientations import (
     approach_directions,
     orientation_set,

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from dense_checks import dense_free
-from scenes import scene_of
 
-from reachmap.core.simplification import shorten
+from reachmap.core.planning.shortcut import shorten
 from reachmap.maps import Status
 from reachmap.sampling.frames import bin_test_frames, workspace_frames
 from reachmap.scans.bin_scan import plan_grasps
-from reachmap.scans.survey import survey_frames
+from reachmap.scans.ik_survey import survey_frames
 from reachmap.scans.workspace_per_frame import plan_frames
 from reachmap.scans.workspace_roadmap import connect_survey, path_to_frame
+from tests.support.dense_checks import dense_free
+from tests.support.scenes import scene_of
 
 SAMPLE = 300
 

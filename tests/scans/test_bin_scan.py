@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from dense_checks import dense_free
-from scenes import scene_of
 
-from reachmap.core.timing import execution_time_s, path_length_rad
+from reachmap.core.planning.timing import execution_time_s, path_length_rad
 from reachmap.geometry import rotation_angle, rotation_from_quaternion_wxyz
 from reachmap.maps import Status, read_bin_map
 from reachmap.tools.bin_scan import bin_scan, estimate_bin_scan, summary_of_bin
 from reachmap.tools.merge import merge
 from reachmap.tools.options import RunOptions
+from tests.support.dense_checks import dense_free
+from tests.support.scenes import scene_of
 
 UR5_FEW = ("bin_scan.grid=[3,2]", "bin_scan.repeats=2")
 TOY = ("bin_scan.repeats=2", "planner.max_checks=300")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from toy_closed_form import margin, verdict
 
 from reachmap.errors import ReachmapError
 from reachmap.geometry import rotation_from_quaternion_wxyz
@@ -15,6 +14,7 @@ from reachmap.tools.workspace_scan import (
     summary_of_workspace,
     workspace_scan,
 )
+from tests.support.toy_closed_form import margin, verdict
 
 MEANING = {
     "no_ik": Status.NO_IK,
@@ -95,7 +95,7 @@ def test_workers_do_not_change_the_map(tmp_path, method):
 
 def test_reachable_frames_of_the_ur5_have_verified_goals(tmp_path):
     """Goals are free and meet their frames; frames without IK have no attempt."""
-    from scenes import scene_of
+    from tests.support.scenes import scene_of
 
     workspace_scan("ur5-eye-in-hand", tmp_path / "w.h5", overrides=UR5_FEW)
     result = read_workspace_map(tmp_path / "w.h5")

@@ -1,13 +1,13 @@
 """Stands in for the workers that score poses: a formula instead of a scene.
 
-from closed_form_evaluator import ClosedForm
+from tests.support.closed_form_evaluator import ClosedForm
 """
 
 from __future__ import annotations
 
-from reachmap.placement.evaluator import Evaluation
-from reachmap.placement.exact import ALWAYS, NEVER, PoseScore
-from reachmap.placement.sample import COARSE
+from reachmap.placement.mapped.evaluator import Evaluation
+from reachmap.placement.mapped.exact import ALWAYS, NEVER, PoseScore
+from reachmap.placement.mapped.sample import COARSE
 
 
 class ClosedForm:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
-from reachmap.core.bodies import build_geometry
+from reachmap.core.collision.bodies import build_geometry
 
 
 def dense_free(scene, q_from, q_to, *, margin_m, share=1 / 3):

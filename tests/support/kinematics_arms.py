@@ -12,8 +12,8 @@ import numpy as np
 import pinocchio as pin
 
 from reachmap._typing import FloatArray
-from reachmap.cell.model import RobotSpec
-from reachmap.core.robot import RobotModel
+from reachmap.cell.model.cell import RobotSpec
+from reachmap.core.robot.model import RobotModel
 
 SHARE = Path(str(distribution("example-robot-data").locate_file("cmeel.prefix/share")))
 ROBOTS = SHARE / "example-robot-data" / "robots"

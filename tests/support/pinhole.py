@@ -1,6 +1,6 @@
 """A pinhole camera by hand: z ahead, x right, y down, angles from the middle.
 
-from pinhole import corners_of, sees
+from tests.support.pinhole import corners_of, sees
 """
 
 from __future__ import annotations

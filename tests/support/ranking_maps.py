@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from reachmap.cell.orientations import ConeFamily
+from reachmap.cell.model.orientations import ConeFamily
 from reachmap.geometry import quaternion_wxyz_from_rotation, yaw_transform
 from reachmap.maps.records import BinMap, PathStore, Provenance, Stamp, Status
 from reachmap.sampling.orientations import orientation_set

@@ -1,6 +1,6 @@
 """Small valid artefacts with a given pattern of reachability.
 
-    from synthetic_maps import synthetic_bin_map, synthetic_workspace_map
+    from tests.support.synthetic_maps import synthetic_bin_map, synthetic_workspace_map
 
 Each keeps to the format, so it can be written, read and verified. Frames that are not
 reachable get causes in turn: no solution, all in collision, no path.
@@ -14,10 +14,10 @@ from typing import Any
 
 import numpy as np
 
-from reachmap.cell.model import BinScanSpec, BinSpec
-from reachmap.cell.orientations import ConeFamily
+from reachmap.cell.model.cell import BinScanSpec, BinSpec
+from reachmap.cell.model.orientations import ConeFamily
 from reachmap.geometry import quaternion_wxyz_from_rotation, yaw_transform
-from reachmap.maps.bin_format import path_lengths
+from reachmap.maps.format.bin import path_lengths
 from reachmap.maps.records import (
     NO_PAIR,
     BinMap,
@@ -29,8 +29,8 @@ from reachmap.maps.records import (
     Stamp,
     Status,
     WorkspaceMap,
+    workspace_map_from_cubes,
 )
-from reachmap.maps.stitching import workspace_map_from_cubes
 from reachmap.sampling.frames import bin_test_frames
 from reachmap.sampling.orientations import orientation_set
 
@@ -50,7 +50,7 @@ def cell_json() -> str:
     """The shipped cell as resolved JSON, without looking up its meshes."""
     from ruamel.yaml import YAML
 
-    from reachmap.cell.model import Cell
+    from reachmap.cell.model.cell import Cell
 
     raw = YAML(typ="safe", pure=True).load(CELL.read_text(encoding="utf-8"))
     return Cell.model_validate(raw).model_dump_json()

@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from reachmap.errors import ReachmapError, SceneError
-from reachmap.scans.work import KINDS, Kind, Work
+from reachmap.runtime.work import KINDS, Kind, Work
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -120,7 +120,7 @@ def write(path, artefact, *, overwrite=False):
 
 
 KIND = Kind(name="toy", blank=blank, assemble=assemble, write=write)
-KINDS["toy"] = "toy_work:KIND"
+KINDS["toy"] = "tests.support.toy_work:KIND"
 
 
 def toy_work(toy=None, **changes):
@@ -154,8 +154,8 @@ def expected(toy=None, *, failed=(), **changes):
 
 def main():
     """Run a toy as a command."""
-    from reachmap.scans.progress import Progress
-    from reachmap.scans.run import run_scan
+    from reachmap.runtime.progress import Progress
+    from reachmap.runtime.run import run_scan
 
     parser = argparse.ArgumentParser()
     parser.add_argument("output", type=Path)
@@ -190,6 +190,6 @@ def main():
 
 if __name__ == "__main__":
     # Workers must find the functions under the same module name.
-    import toy_work as this
+    from tests.support import toy_work as this
 
     sys.exit(this.main())

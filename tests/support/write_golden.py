@@ -1,8 +1,8 @@
-"""Write the golden files of the current format version into tests/maps/golden.
+"""Write the golden files of the current format version into tests/maps/format/golden.
 
 Run once when a format version is new, from the root of the checkout::
 
-    PYTHONPATH=tests/support python tests/support/write_golden.py
+    python -m tests.support.write_golden
 
 Files of older versions stay as they are: they prove that old maps can be read.
 """
@@ -15,17 +15,17 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from synthetic_maps import (
+
+from reachmap.maps import write_bin_map, write_placement, write_workspace_map
+from reachmap.maps.format.layout import FORMAT_VERSION
+from tests.support.synthetic_maps import (
     synthetic_bin_map,
     synthetic_placement,
     synthetic_provenance,
     synthetic_workspace_map,
 )
 
-from reachmap.maps import write_bin_map, write_placement, write_workspace_map
-from reachmap.maps.schema import FORMAT_VERSION
-
-GOLDEN = Path(__file__).parents[1] / "maps" / "golden"
+GOLDEN = Path(__file__).parents[1] / "maps" / "format" / "golden"
 
 
 def main() -> None:

@@ -5,9 +5,9 @@ from __future__ import annotations
 import json
 
 import pytest
-from toy_truth import OVERRIDES, clear_rows, toy_grasps
 
 from reachmap.tools.bin_scan import bin_scan
+from tests.support.toy_truth import OVERRIDES, clear_rows, toy_grasps
 
 
 @pytest.fixture(scope="session")

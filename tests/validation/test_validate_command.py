@@ -7,9 +7,9 @@ import re
 
 import pytest
 from click.testing import CliRunner
-from toy_truth import toy_grasps
 
 from reachmap.cli import group
+from tests.support.toy_truth import toy_grasps
 
 
 def run(*arguments):

@@ -7,10 +7,10 @@ import json
 
 import numpy as np
 import pytest
-from toy_truth import clear_rows, toy_grasps
 
 from reachmap.plots.validation import validation_chart
 from reachmap.tools.validate import validate
+from tests.support.toy_truth import clear_rows, toy_grasps
 
 
 @pytest.fixture(scope="module")

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from ranking_maps import make_bin_map
 
-from reachmap.cell.orientations import ConeFamily
+from reachmap.cell.model.orientations import ConeFamily
 from reachmap.errors import SettingsError
 from reachmap.geometry import rotation_angle, rotation_from_quaternion_wxyz
 from reachmap.ranking import Ranker, RankSettings, grasps_from_document, rank_list
 from reachmap.validation.picks import join_picks, picks_of, tool_poses
 from reachmap.validation.random_grasps import random_grasps
+from tests.support.ranking_maps import make_bin_map
 
 
 def ranked(grasps, **settings):

@@ -6,12 +6,12 @@ import json
 
 import numpy as np
 import pytest
-from toy_truth import clear_rows, slack_of, toy_grasps
 
 from reachmap.maps import Status, read_bin_map
 from reachmap.ranking import RankSettings
 from reachmap.tools.options import RunOptions
 from reachmap.tools.validate import PickOptions, validate
+from tests.support.toy_truth import clear_rows, slack_of, toy_grasps
 
 COUNT = 60
 ROWS = clear_rows(COUNT, seed=1)

@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from chromium import Page, chromium, find_chromium
-from toy_artefacts import toy_bin_map, toy_workspace
 
 from reachmap.maps import write_bin_map, write_workspace_map
 from reachmap.tools.view import ViewOptions, view
+from tests.support.chromium import Page, chromium, find_chromium
+from tests.support.toy_artefacts import toy_bin_map, toy_workspace
 
 pytest.importorskip("viser")
 

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from synthetic_maps import (
+
+from reachmap.maps.records import Status
+from reachmap.view.points import EVERYTHING, points_of, shortest_paths
+from tests.support.synthetic_maps import (
     synthetic_bin_map,
     synthetic_placement,
     synthetic_workspace_map,
 )
-
-from reachmap.maps.records import Status
-from reachmap.view.points import EVERYTHING, points_of, shortest_paths
 
 
 def test_workspace_points_have_the_stitched_percentages() -> None:

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from toy_artefacts import toy_bin_map
 
-from reachmap.core.solids import SolidCell
+from reachmap.core.collision.solids import SolidCell
 from reachmap.errors import SettingsError
 from reachmap.tools.options import cell_of_artefact
 from reachmap.view.playback import (
@@ -17,6 +16,7 @@ from reachmap.view.playback import (
     way_points,
 )
 from reachmap.view.points import shortest_paths
+from tests.support.toy_artefacts import toy_bin_map
 
 
 @pytest.fixture(scope="module")

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from toy_artefacts import toy_bin_map, toy_workspace
 
 from reachmap.core.scene import Scene
 from reachmap.maps.records import Status
 from reachmap.tools.options import cell_of_artefact
+from reachmap.view.inspect_frame import answer, best_first
 from reachmap.view.points import MapPoints, points_of
-from reachmap.view.question import answer, best_first
+from tests.support.toy_artefacts import toy_bin_map, toy_workspace
 
 
 @pytest.fixture(scope="module")

@@ -7,10 +7,9 @@ import pytest
 from matplotlib.figure import Figure
 
 from reachmap.cell.loading import read_cell
-from reachmap.core.solids import SolidCell
-from reachmap.core.tessellation import box_triangles, capsule_triangles
-from reachmap.plots.cell_view import draw_cell
-from reachmap.plots.raster import (
+from reachmap.core.collision.solids import SolidCell, box_triangles, capsule_triangles
+from reachmap.plots.cell.cell_view import draw_cell
+from reachmap.plots.cell.raster import (
     Facets,
     Window,
     facets_of,
@@ -19,7 +18,7 @@ from reachmap.plots.raster import (
     view_axes,
     visible_area,
 )
-from reachmap.plots.style import figure_bytes
+from reachmap.plots.parts.style import figure_bytes
 
 RED, BLUE = np.array([0.9, 0.1, 0.1]), np.array([0.1, 0.1, 0.9])
 TOP = Window(axes=view_axes(-90.0, 90.0), low=np.full(2, -1.0), high=np.full(2, 1.0))
@@ -85,8 +84,8 @@ def test_nothing_is_drawn_where_nothing_is() -> None:
 
 def test_a_cell_is_drawn_in_three_views(monkeypatch: pytest.MonkeyPatch) -> None:
     """Axes are in metres, bodies in contact are red, equal cells give equal bytes."""
-    monkeypatch.setattr("reachmap.plots.style.DPI", 40)
-    monkeypatch.setattr("reachmap.plots.cell_view.PIXELS_PER_IN", 20.0)
+    monkeypatch.setattr("reachmap.plots.parts.style.DPI", 40)
+    monkeypatch.setattr("reachmap.plots.cell.cell_view.PIXELS_PER_IN", 20.0)
     cell = SolidCell.build(read_cell("planar-toy"))
     figure = draw_cell(cell, title="toy")
     labels = [axes.get_ylabel() for axes in figure.axes]

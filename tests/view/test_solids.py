@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scenes import scene_of
 
 from reachmap.cell.loading import read_cell
-from reachmap.core.solids import SolidCell
-from reachmap.core.tessellation import (
+from reachmap.core.collision.solids import (
+    SolidCell,
     Triangles,
     box_triangles,
     capsule_triangles,
     cylinder_triangles,
 )
 from reachmap.geometry import inverse_transform
+from tests.support.scenes import scene_of
 
 
 def volume(shape: Triangles) -> float:

@@ -17,16 +17,16 @@ from typing import Any
 import numpy as np
 import pytest
 from click.testing import CliRunner, Result
-from synthetic_maps import synthetic_placement
-from toy_artefacts import toy_bin_map, toy_workspace
 
 from reachmap.cli import group
-from reachmap.core.solids import SolidCell
+from reachmap.core.collision.solids import SolidCell
 from reachmap.errors import MissingExtraError
 from reachmap.maps import write_bin_map, write_workspace_map
 from reachmap.tools.options import cell_of_artefact
 from reachmap.tools.view import ViewOptions, view
-from reachmap.view.question import best_first
+from reachmap.view.inspect_frame import best_first
+from tests.support.synthetic_maps import synthetic_placement
+from tests.support.toy_artefacts import toy_bin_map, toy_workspace
 
 pytest.importorskip("viser")
 
@@ -229,7 +229,7 @@ def test_a_click_ends_the_playback(app: Any) -> None:
 def test_names_are_escaped() -> None:
     """A name cannot put anything on the page."""
     from reachmap.view.app import _paragraph
-    from reachmap.view.page_frame import framed
+    from reachmap.view.page import framed
 
     page = framed(
         "<html><head></head><body></body></html>",

@@ -14,12 +14,12 @@ from typing import Any
 from xml.sax.saxutils import quoteattr, unescape
 
 from reachmap._typing import FloatArray
-from reachmap.cell.fields import PoseSpec
-from reachmap.cell.files import body_key
-from reachmap.cell.joint_limits import MoveItLimits
-from reachmap.cell.model import Cell, ScanConfiguration
-from reachmap.cell.resources import NotFoundError, Resolver, search_folders
-from reachmap.cell.urdf import UrdfDescription, parse_urdf
+from reachmap.cell.files.files import body_key
+from reachmap.cell.files.joint_limits import MoveItLimits
+from reachmap.cell.files.resources import NotFoundError, Resolver, search_folders
+from reachmap.cell.files.urdf import UrdfDescription, parse_urdf
+from reachmap.cell.model.cell import Cell, ScanConfiguration
+from reachmap.cell.model.fields import PoseSpec
 from reachmap.errors import CellError
 from reachmap.geometry import quaternion_wxyz_from_rotation
 

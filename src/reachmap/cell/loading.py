@@ -7,16 +7,15 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from reachmap.cell.doubts import find_doubts
-from reachmap.cell.files import compare_hashes, read_files, stored_files
+from reachmap.cell.files.files import compare_hashes, read_files, stored_files
+from reachmap.cell.files.resources import shipped_folder
 from reachmap.cell.loaded import LoadedCell, fingerprint
-from reachmap.cell.model import Cell
-from reachmap.cell.model_paths import did_you_mean
-from reachmap.cell.overrides import apply_overrides
-from reachmap.cell.references import check_names
+from reachmap.cell.model.cell import Cell
+from reachmap.cell.references import check_names, find_doubts
 from reachmap.cell.resolution import resolved_cell, validated
-from reachmap.cell.resources import shipped_folder
-from reachmap.cell.yaml_text import (
+from reachmap.cell.text.messages import did_you_mean
+from reachmap.cell.text.overrides import apply_overrides
+from reachmap.cell.text.yaml_reader import (
     MAX_TEXT_BYTES,
     Document,
     Place,

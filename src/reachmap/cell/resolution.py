@@ -8,13 +8,13 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from reachmap.cell.files import CellFiles
-from reachmap.cell.joint_limits import tighten_limits
-from reachmap.cell.messages import add_validation_errors
-from reachmap.cell.model import Cell
+from reachmap.cell.files.files import CellFiles
+from reachmap.cell.files.joint_limits import tighten_limits
+from reachmap.cell.files.resources import SCHEME, SHIPPED, Resolver, shipped_folder
+from reachmap.cell.model.cell import Cell
 from reachmap.cell.references import moving_joints
-from reachmap.cell.resources import SCHEME, SHIPPED, Resolver, shipped_folder
-from reachmap.cell.yaml_text import Document
+from reachmap.cell.text.messages import add_validation_errors
+from reachmap.cell.text.yaml_reader import Document
 
 
 def validated(document: Document) -> Cell | None:

@@ -8,8 +8,8 @@ import textwrap
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from reachmap.cell.urdf import UrdfDescription, UrdfJoint
-from reachmap.cell.yaml_writer import WIDTH, scalar
+from reachmap.cell.files.urdf import UrdfDescription, UrdfJoint
+from reachmap.cell.text.yaml_writer import WIDTH, scalar
 from reachmap.errors import SettingsError
 
 # Names that tool flanges have in published robot descriptions, best first.

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from reachmap._typing import FloatArray
-from reachmap.core.bin_fit import BinFit
-from reachmap.core.bodies import bin_placements, build_geometry
-from reachmap.core.collision import CollisionChecker
-from reachmap.core.kinematics import Kinematics
-from reachmap.core.motion import MotionChecker
-from reachmap.core.planning import Planner
-from reachmap.core.robot import RobotModel
+from reachmap.core.collision.bin_fit import BinFit
+from reachmap.core.collision.bodies import bin_placements, build_geometry
+from reachmap.core.collision.checker import CollisionChecker
+from reachmap.core.kinematics.kinematics import Kinematics
+from reachmap.core.planning.motion import MotionChecker
+from reachmap.core.planning.planner import Planner
+from reachmap.core.robot.model import RobotModel
 from reachmap.errors import SceneError
 
 if TYPE_CHECKING:

@@ -6,11 +6,14 @@ bytes up to what its numbers say to each other.
 
 from __future__ import annotations
 
-from reachmap.maps.bin_file import read_bin_map, write_bin_map
-from reachmap.maps.hashing import canonical_json, config_sha256
-from reachmap.maps.placement_file import read_placement, write_placement
+from reachmap.maps.bytes.hashing import canonical_json, config_sha256
+from reachmap.maps.bytes.publish import check_output, publish
+from reachmap.maps.format.bin import read_bin_map, write_bin_map
+from reachmap.maps.format.placement import read_placement, write_placement
+from reachmap.maps.format.registry import read_provenance
+from reachmap.maps.format.store import artefact_kind
+from reachmap.maps.format.workspace import read_workspace_map, write_workspace_map
 from reachmap.maps.provenance import RunClock, collect_provenance
-from reachmap.maps.publish import check_output, publish
 from reachmap.maps.records import (
     NO_PAIR,
     BinMap,
@@ -22,11 +25,8 @@ from reachmap.maps.records import (
     Stamp,
     Status,
     WorkspaceMap,
+    workspace_map_from_cubes,
 )
-from reachmap.maps.stamps import read_provenance
-from reachmap.maps.stitching import workspace_map_from_cubes
-from reachmap.maps.storage import artefact_kind
-from reachmap.maps.workspace_file import read_workspace_map, write_workspace_map
 
 __all__ = [
     "NO_PAIR",

@@ -14,8 +14,8 @@ from importlib import metadata
 from typing import TYPE_CHECKING, Any
 
 from reachmap.errors import MapFileError
+from reachmap.maps.bytes.tree import plain
 from reachmap.maps.records import Provenance, RunInfo
-from reachmap.maps.tree import plain
 
 if TYPE_CHECKING:
     from reachmap.cell.loaded import LoadedCell

@@ -7,16 +7,16 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from reachmap._typing import FloatArray
-from reachmap.placement.evaluator import Evaluator
-from reachmap.placement.exact import Pose
-from reachmap.placement.region import AXES
-from reachmap.placement.sample import THIN
+from reachmap.placement.mapped.evaluator import Evaluator
+from reachmap.placement.mapped.exact import Pose
+from reachmap.placement.mapped.sample import THIN
+from reachmap.placement.predicted.region import AXES
 
 DROP_POINTS = 5.0
 SHIFTS_M = (0.01, 0.02, 0.03, 0.05, 0.07, 0.10, 0.15)
 TURNS_RAD = tuple(np.radians((2.0, 5.0, 8.0, 12.0, 20.0, 30.0, 45.0)).tolist())
 # The pose itself; in each direction the last rung, then a bisection of the others.
-MOST_POSES = 1 + 2 * len(AXES) * (1 + int(np.log2(len(SHIFTS_M))) + 1)
+MARGIN_POSES = 1 + 2 * len(AXES) * (1 + int(np.log2(len(SHIFTS_M))) + 1)
 Direction = tuple[int, float]
 
 
@@ -48,7 +48,7 @@ def margins(
         ``+x``, ``-x``, … ``-yaw`` to metres or radians; empty where the score cannot
         drop that far.
     """
-    evaluator.expect(MOST_POSES)
+    evaluator.expect(MARGIN_POSES)
     here = evaluator.evaluate([pose], q, grid=THIN)[0].score
     if here is None or here.score <= DROP_POINTS:
         return {}

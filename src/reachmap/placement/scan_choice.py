@@ -8,9 +8,9 @@ from itertools import islice
 import numpy as np
 
 from reachmap._typing import FloatArray
-from reachmap.placement.evaluator import Evaluator
-from reachmap.placement.exact import PlacedScene, PoseScore
-from reachmap.placement.imaging import imaging_configurations
+from reachmap.placement.mapped.evaluator import Evaluator
+from reachmap.placement.mapped.exact import PlacedScene, PoseScore
+from reachmap.placement.mapped.imaging import imaging_configurations
 
 FINALISTS = 6
 EQUAL_POINTS = 0.5

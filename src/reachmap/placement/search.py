@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
+from reachmap._typing import FloatArray
 from reachmap.errors import SceneError
-from reachmap.placement import refine
-from reachmap.placement.candidates import Candidate, CandidateTable
-from reachmap.placement.decision import (
-    REMEDY,
-    SETTLING,
-    Decision,
-    nowhere,
-    paper_pose,
-)
-from reachmap.placement.exact import Pose
-from reachmap.placement.imaging import UNSEEN
-from reachmap.placement.places import apart_m, rank_key, spread_out
-from reachmap.placement.question import Question
+from reachmap.placement.decision import REMEDY, SETTLING, Decision, nowhere, paper_pose
+from reachmap.placement.mapped.candidates import Candidate, CandidateTable
+from reachmap.placement.mapped.evaluator import Evaluator
+from reachmap.placement.mapped.exact import Pose
+from reachmap.placement.mapped.imaging import UNSEEN
+from reachmap.placement.predicted.places import apart_m, rank_key, spread_out
+from reachmap.placement.predicted.region import AXES, Region
+from reachmap.placement.problem import Question
 
 TURNS_DEG = (45.0, 90.0, 135.0)
 PLACES_IMPROVED = 2
@@ -45,7 +43,7 @@ def decide_by_search(question: Question, top: int) -> Decision:
     finalists = _finalists(question, top, decision.table)
     paper = paper_pose(question)
     poses = [c.pose for c in finalists] + ([] if paper is None else [paper])
-    question.evaluator.expect(len(poses) + MOST_TURNS + refine.MOST_POSES + SETTLING)
+    question.evaluator.expect(len(poses) + MOST_TURNS + REFINE_POSES + SETTLING)
     mapped = question.exact(poses)
     scored = sorted((c for c in mapped if c.score is not None), key=rank_key)
     better = _improved(question, scored[:PLACES_IMPROVED])
@@ -95,10 +93,10 @@ def _improved(question: Question, starts: list[Candidate]) -> list[Pose]:
     if not starts:
         return []
     evaluator = question.evaluator
-    evaluator.expect(MOST_TURNS + refine.MOST_POSES + SETTLING)
+    evaluator.expect(MOST_TURNS + REFINE_POSES + SETTLING)
     best = _turned(question, starts)
-    evaluator.expect(refine.MOST_POSES + SETTLING)
-    moved = refine.refine(
+    evaluator.expect(REFINE_POSES + SETTLING)
+    moved = refine(
         min(best, key=rank_key),
         question.start,
         question.region,
@@ -117,7 +115,7 @@ def _turned(question: Question, starts: list[Candidate]) -> list[Candidate]:
         if not question.reason_against(pose)
     }
     above = [
-        start.score.score + refine.MIN_GAIN_POINTS
+        start.score.score + MIN_GAIN_POINTS
         for start in turns.values()
         if start.score is not None
     ]
@@ -133,3 +131,76 @@ def _with_turn(pose: Pose, turn_deg: float, question: Question) -> Pose:
     low = float(question.region.low[3])
     yaw = low + (pose[3] + np.radians(turn_deg) - low) % np.pi
     return (*pose[:3], round(float(yaw), 9))
+
+
+FIRST_STEPS = (0.04, 0.04, 0.04, np.radians(15.0))
+ROUNDS = 4
+HALVINGS = 1
+MIN_GAIN_POINTS = 0.25
+REFINE_POSES = ROUNDS * 2 * len(AXES)
+
+
+def refine(
+    start: Candidate,
+    q: FloatArray | None,
+    region: Region,
+    reason_against: Callable[[Pose], str],
+    evaluator: Evaluator,
+) -> Candidate:
+    """Search around a pose, exactly: the best neighbour is the next start.
+
+    Neighbours are one step away along one of x, y, z, yaw; when none is better, the
+    step is halved, and when again none is, or after four rounds, the search ends. A
+    neighbour whose bound is less than a quarter of a point above the score is not
+    worth mapping.
+
+    Parameters
+    ----------
+    start : Candidate
+        With an exact score.
+    q : array, shape (dof,), or None
+        Scan configuration; see :meth:`Evaluator.evaluate`.
+    region : Region
+    reason_against : callable
+        Why a pose is not feasible, "" if it is.
+    evaluator : Evaluator
+
+    Returns
+    -------
+    Candidate
+        The best that was found, which may be the start.
+    """
+    best, steps, halvings = start, np.array(FIRST_STEPS), 0
+    for _ in range(ROUNDS):
+        poses = [
+            pose
+            for pose in _neighbours(best.pose, steps, region)
+            if not reason_against(pose)
+        ]
+        assert best.score is not None
+        found = evaluator.evaluate(poses, q, above=best.score.score + MIN_GAIN_POINTS)
+        better = [
+            Candidate(pose=pose, score=e.score, exact=True)
+            for pose, e in zip(poses, found, strict=True)
+            if e.score is not None
+        ]
+        champion = min([best, *better], key=rank_key)
+        if champion is best:
+            if halvings == HALVINGS:
+                break
+            steps, halvings = steps / 2, halvings + 1
+        best = champion
+    return best
+
+
+def _neighbours(pose: Pose, steps: FloatArray, region: Region) -> list[Pose]:
+    found: list[Pose] = []
+    for k, name in enumerate(AXES):
+        if region.fixed(name):
+            continue
+        for sign in (1.0, -1.0):
+            moved = list(pose)
+            moved[k] = round(moved[k] + sign * float(steps[k]), 9)
+            if not region.outside(np.array(moved)):
+                found.append((moved[0], moved[1], moved[2], moved[3]))
+    return found

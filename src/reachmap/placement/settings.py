@@ -6,25 +6,16 @@ from typing import Any
 
 import numpy as np
 
-from reachmap.placement import (
-    exact,
-    footprint,
-    imaging,
-    margins,
-    places,
-    refine,
-    sample,
-    scan_choice,
-    search,
-    viewpoints,
-)
+from reachmap.placement import margins, scan_choice, search
+from reachmap.placement.mapped import exact, imaging, sample, viewpoints
+from reachmap.placement.predicted import places, prediction
 
 
 def placement_settings() -> dict[str, Any]:
     """Everything that a placement depends on besides the cell, the map and options."""
     return {
         "samples": {
-            "predicted": list(footprint.POINTS),
+            "predicted": list(prediction.POINTS),
             "thin": list(sample.THIN),
             "coarse": list(sample.COARSE),
         },
@@ -37,10 +28,10 @@ def placement_settings() -> dict[str, Any]:
         "near_unseen_m": search.NEAR_UNSEEN_M,
         "turns_deg": list(search.TURNS_DEG),
         "places_improved": search.PLACES_IMPROVED,
-        "refine_steps": np.round(refine.FIRST_STEPS, 9).tolist(),
-        "refine_rounds": refine.ROUNDS,
-        "refine_halvings": refine.HALVINGS,
-        "refine_min_gain_points": refine.MIN_GAIN_POINTS,
+        "refine_steps": np.round(search.FIRST_STEPS, 9).tolist(),
+        "refine_rounds": search.ROUNDS,
+        "refine_halvings": search.HALVINGS,
+        "refine_min_gain_points": search.MIN_GAIN_POINTS,
         "margin_points": margins.DROP_POINTS,
         "margin_shifts_m": list(margins.SHIFTS_M),
         "margin_turns_rad": np.round(margins.TURNS_RAD, 9).tolist(),

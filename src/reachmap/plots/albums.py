@@ -14,17 +14,17 @@ from reachmap.errors import SettingsError
 from reachmap.maps.records import BinMap, BinPlacement, WorkspaceMap
 from reachmap.plots.approach import draw_approach
 from reachmap.plots.bin_map import draw_costs, draw_reachability
-from reachmap.plots.bin_view import percent_after
 from reachmap.plots.causes import draw_causes
 from reachmap.plots.comparison import MapChange, draw_change_sheet, draw_comparison
-from reachmap.plots.files import Picture, Table, level_table
 from reachmap.plots.heatmap import draw_level
-from reachmap.plots.levels import QUANTITY_NAMES, Quantity, level_names
 from reachmap.plots.overview import draw_overview
+from reachmap.plots.parts.bin_view import percent_after
+from reachmap.plots.parts.files import Picture, Table, level_table
+from reachmap.plots.parts.levels import QUANTITY_NAMES, Quantity, level_names
+from reachmap.plots.parts.stack import LevelStack, level_title, stack_of
+from reachmap.plots.parts.style import PercentMap
 from reachmap.plots.placement import draw_placement, placement_words
 from reachmap.plots.saturation import draw_saturation
-from reachmap.plots.stack import LevelStack, level_title, stack_of
-from reachmap.plots.style import PercentMap
 
 # How close a height must be to a level to mean it [m].
 LEVEL_TOLERANCE = 1e-3

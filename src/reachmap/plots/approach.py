@@ -19,10 +19,10 @@ from matplotlib.patches import Patch
 from reachmap._typing import CodeArray, FloatArray, IntArray
 from reachmap.geometry import rotation_from_quaternion_wxyz
 from reachmap.maps.records import BinMap, Status
-from reachmap.maps.statistics import STATUS_NAMES
-from reachmap.plots.bin_view import frame_bin, view_of
-from reachmap.plots.squares import axis_titles, cell_edges
-from reachmap.plots.style import (
+from reachmap.maps.summary.statistics import STATUS_NAMES
+from reachmap.plots.parts.bin_view import frame_bin, view_of
+from reachmap.plots.parts.squares import axis_titles, cell_edges
+from reachmap.plots.parts.style import (
     MUTED,
     axes_at,
     drawing,

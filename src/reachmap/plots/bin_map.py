@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from reachmap._typing import FloatArray
 from reachmap.maps.records import BinMap
-from reachmap.plots.bin_view import (
+from reachmap.plots.parts.bin_view import (
     BinView,
     attempted,
     found_after,
@@ -18,7 +18,7 @@ from reachmap.plots.bin_view import (
     percent_after,
     view_of,
 )
-from reachmap.plots.squares import (
+from reachmap.plots.parts.squares import (
     MISSING,
     PERCENT_SCALE,
     axis_titles,
@@ -26,7 +26,7 @@ from reachmap.plots.squares import (
     draw_squares,
     number_size,
 )
-from reachmap.plots.style import (
+from reachmap.plots.parts.style import (
     COST_MAP,
     PercentMap,
     axes_at,

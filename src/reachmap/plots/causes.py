@@ -7,11 +7,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from reachmap.maps.records import BinMap, Status, WorkspaceMap
-from reachmap.maps.statistics import STATUS_NAMES
-from reachmap.maps.statistics import causes_of as causes_of
+from reachmap.maps.summary.statistics import STATUS_NAMES
+from reachmap.maps.summary.statistics import causes_of as causes_of
 from reachmap.plots.approach import STATUS_COLOURS
-from reachmap.plots.context import context_of
-from reachmap.plots.style import (
+from reachmap.plots.parts.context import context_of
+from reachmap.plots.parts.style import (
     INK,
     TICK_SIZE,
     axes_at,

@@ -13,22 +13,22 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 
 from reachmap._typing import BoolArray, FloatArray
-from reachmap.plots.levels import level_means, level_names
-from reachmap.plots.numbers import closed_path
-from reachmap.plots.outlines import Outline, draw_outline, legend_lines
 from reachmap.plots.overview import sheet_columns
-from reachmap.plots.squares import (
+from reachmap.plots.parts.levels import level_means, level_names
+from reachmap.plots.parts.outlines import Outline, draw_outline, legend_lines
+from reachmap.plots.parts.squares import (
     MINUS,
     PERCENT_SCALE,
     axis_titles,
     cell_edges,
+    closed_path,
     colour_bar,
     draw_squares,
     number_size,
     percent_text,
     signed_text,
 )
-from reachmap.plots.style import (
+from reachmap.plots.parts.style import (
     CHANGE_MAP,
     INK,
     MUTED,

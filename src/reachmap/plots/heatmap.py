@@ -13,24 +13,24 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
 from matplotlib.patheffects import withStroke
 
-from reachmap.plots.levels import (
+from reachmap.plots.parts.levels import (
     QUANTITY_NAMES,
     best_level,
     best_patch,
     best_square,
 )
-from reachmap.plots.numbers import closed_path
-from reachmap.plots.outlines import draw_outline, legend_lines
-from reachmap.plots.squares import (
+from reachmap.plots.parts.outlines import draw_outline, legend_lines
+from reachmap.plots.parts.squares import (
     PERCENT_SCALE,
     axis_titles,
     cell_edges,
+    closed_path,
     colour_bar,
     draw_squares,
     number_size,
 )
-from reachmap.plots.stack import LevelStack, level_subtitle, level_title
-from reachmap.plots.style import (
+from reachmap.plots.parts.stack import LevelStack, level_subtitle, level_title
+from reachmap.plots.parts.style import (
     NOT_ATTEMPTED,
     PALE,
     PercentMap,

@@ -8,11 +8,11 @@ from matplotlib.figure import Figure
 
 from reachmap._typing import FloatArray
 from reachmap.plots.heatmap import draw_level_on, is_marked
-from reachmap.plots.levels import QUANTITY_NAMES, best_level, level_means
-from reachmap.plots.outlines import legend_lines
-from reachmap.plots.squares import colour_bar
-from reachmap.plots.stack import LevelStack, best_text, height_text, mean_text
-from reachmap.plots.style import (
+from reachmap.plots.parts.levels import QUANTITY_NAMES, best_level, level_means
+from reachmap.plots.parts.outlines import legend_lines
+from reachmap.plots.parts.squares import colour_bar
+from reachmap.plots.parts.stack import LevelStack, best_text, height_text, mean_text
+from reachmap.plots.parts.style import (
     INK,
     MUTED,
     RULE,

@@ -14,23 +14,23 @@ from matplotlib.patheffects import withStroke
 from reachmap._typing import BoolArray, FloatArray
 from reachmap.geometry import yaw_transform
 from reachmap.maps.records import BinPlacement, WorkspaceMap
-from reachmap.plots.context import CellContext, context_of
-from reachmap.plots.outlines import (
+from reachmap.plots.parts.context import CellContext, context_of
+from reachmap.plots.parts.outlines import (
     Kind,
     Outline,
     bin_outlines,
     draw_outline,
     legend_lines,
 )
-from reachmap.plots.squares import (
+from reachmap.plots.parts.squares import (
     MINUS,
     PERCENT_SCALE,
     axis_titles,
     colour_bar,
     draw_squares,
 )
-from reachmap.plots.stack import LevelStack, height_text
-from reachmap.plots.style import (
+from reachmap.plots.parts.stack import LevelStack, height_text
+from reachmap.plots.parts.style import (
     BIN_COLOUR,
     INK,
     MUTED,

@@ -14,7 +14,7 @@ from matplotlib.patheffects import withStroke
 
 from reachmap._typing import FloatArray
 from reachmap.errors import SettingsError
-from reachmap.plots.style import (
+from reachmap.plots.parts.style import (
     INK,
     MUTED,
     NOT_ATTEMPTED,

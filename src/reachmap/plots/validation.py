@@ -11,8 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from reachmap.plots.ranking import TERM_COLOURS, TERM_LABELS
-from reachmap.plots.style import (
+from reachmap.plots.parts.style import (
     INK,
     MUTED,
     NOT_ATTEMPTED,
@@ -22,7 +21,8 @@ from reachmap.plots.style import (
     new_figure,
     put_title,
 )
-from reachmap.ranking.rank_text import printable
+from reachmap.plots.ranking import TERM_COLOURS, TERM_LABELS
+from reachmap.text import printable
 from reachmap.validation.judgement import ORDERS, JudgedList
 from reachmap.validation.statistics import Share
 from reachmap.validation.summary import GroupSummary, OrderFigures, Validation

@@ -13,14 +13,18 @@ engine is imported.
 
 from __future__ import annotations
 
-from reachmap.ranking.approach import align, rotation_between
-from reachmap.ranking.grasp_arrays import GraspList
-from reachmap.ranking.grasps import grasps_from_document, read_grasps
-from reachmap.ranking.order import OUTSIDE_MAP, Ranking
-from reachmap.ranking.pipeline import rank_list
-from reachmap.ranking.ranked_list import RankedList, document_text, ranked_document
-from reachmap.ranking.ranker import Ranker
-from reachmap.ranking.settings import RankSettings
+from reachmap.ranking.answers.pipeline import rank_list
+from reachmap.ranking.answers.ranked_list import (
+    RankedList,
+    document_text,
+    ranked_document,
+)
+from reachmap.ranking.lists.arrays import GraspList
+from reachmap.ranking.lists.reading import grasps_from_document, read_grasps
+from reachmap.ranking.lookup.approach import align, rotation_between
+from reachmap.ranking.lookup.order import OUTSIDE_MAP, Ranking
+from reachmap.ranking.lookup.ranker import Ranker
+from reachmap.ranking.lookup.settings import RankSettings
 
 __all__ = [
     "OUTSIDE_MAP",

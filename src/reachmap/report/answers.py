@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from reachmap.maps.placement_summary import summarise_placement
-from reachmap.maps.statistics import best_level, level_means, saturation_of
+from reachmap.maps.summary.placement import summarise_placement
+from reachmap.maps.summary.statistics import best_level, level_means, saturation_of
 from reachmap.report.folder import RunFolder
 from reachmap.report.markup import Html, element, joined, paragraph
 from reachmap.report.numbers import count, interval, number, percent, signed

@@ -2,12 +2,23 @@
 
 from __future__ import annotations
 
-from reachmap.maps.approximation import ik_approximation
 from reachmap.maps.records import BinMap, WorkspaceMap
-from reachmap.maps.statistics import STATUS_NAMES, Causes, causes_of
+from reachmap.maps.summary.statistics import (
+    STATUS_NAMES,
+    Causes,
+    causes_of,
+    ik_approximation,
+)
 from reachmap.plots.causes import draw_causes
-from reachmap.report.drawing import drawn
-from reachmap.report.markup import Html, element, joined, paragraph, section, table
+from reachmap.report.markup import (
+    Html,
+    drawn,
+    element,
+    joined,
+    paragraph,
+    section,
+    table,
+)
 from reachmap.report.numbers import percent
 
 PAIRS_SHOWN = 8

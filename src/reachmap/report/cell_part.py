@@ -4,14 +4,21 @@ from __future__ import annotations
 
 from pathlib import PurePosixPath
 
-from reachmap.cell.fields import Shape
 from reachmap.cell.loaded import LoadedCell
-from reachmap.core.solids import SolidCell
+from reachmap.cell.model.fields import Shape
+from reachmap.core.collision.solids import SolidCell
 from reachmap.errors import ReachmapError
-from reachmap.maps.any_file import Artefact
-from reachmap.plots.cell_view import draw_cell
-from reachmap.report.drawing import drawn
-from reachmap.report.markup import Html, element, facts, paragraph, section, table
+from reachmap.maps.format.registry import Artefact
+from reachmap.plots.cell.cell_view import draw_cell
+from reachmap.report.markup import (
+    Html,
+    drawn,
+    element,
+    facts,
+    paragraph,
+    section,
+    table,
+)
 from reachmap.report.numbers import count, number, signed
 
 TITLE = "The cell"

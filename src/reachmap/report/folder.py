@@ -15,9 +15,9 @@ from reachmap.maps import (
     read_placement,
     read_workspace_map,
 )
-from reachmap.maps.any_file import Artefact
+from reachmap.maps.format.registry import Artefact
 from reachmap.maps.records import BinMap, BinPlacement, WorkspaceMap
-from reachmap.ranking.json_text import parse_json
+from reachmap.ranking.lists.json_text import parse_json
 
 MAX_JSON_BYTES = 64 * 2**20
 

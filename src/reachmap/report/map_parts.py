@@ -4,27 +4,34 @@ from __future__ import annotations
 
 import numpy as np
 
-from reachmap.maps.bin_summary import MEASURES, BinSummary, summarise_bin
-from reachmap.maps.placement_summary import (
+from reachmap.maps.records import BinMap, BinPlacement, WorkspaceMap
+from reachmap.maps.summary.bin import MEASURES, BinSummary, summarise_bin
+from reachmap.maps.summary.placement import (
     CandidateSummary,
     PlacementSummary,
     summarise_placement,
 )
-from reachmap.maps.records import BinMap, BinPlacement, WorkspaceMap
-from reachmap.maps.workspace_summary import WorkspaceSummary, summarise_workspace
+from reachmap.maps.summary.workspace import WorkspaceSummary, summarise_workspace
 from reachmap.plots.approach import draw_approach
 from reachmap.plots.bin_map import draw_costs, draw_reachability
 from reachmap.plots.heatmap import draw_level
-from reachmap.plots.levels import level_names
 from reachmap.plots.overview import draw_overview
+from reachmap.plots.parts.levels import level_names
+from reachmap.plots.parts.stack import stack_of
 from reachmap.plots.placement import draw_placement
 from reachmap.plots.saturation import draw_saturation
-from reachmap.plots.stack import stack_of
-from reachmap.ranking.costs import grasp_costs
-from reachmap.ranking.settings import RankSettings
-from reachmap.ranking.table import table_from_bin_map
-from reachmap.report.drawing import drawn
-from reachmap.report.markup import Html, element, joined, paragraph, section, table
+from reachmap.ranking.lookup.costs import grasp_costs
+from reachmap.ranking.lookup.settings import RankSettings
+from reachmap.ranking.lookup.table import table_from_bin_map
+from reachmap.report.markup import (
+    Html,
+    drawn,
+    element,
+    joined,
+    paragraph,
+    section,
+    table,
+)
 from reachmap.report.numbers import MINUS, count, interval, number, percent, signed
 
 REASONS_SHOWN = 6

@@ -5,6 +5,13 @@ from __future__ import annotations
 import base64
 import html
 from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
+
+from reachmap.maps.format.registry import Artefact
+from reachmap.plots.parts.style import figure_bytes
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 PNG_DPI = 200.0
 # Pictures are shown a little larger than on paper.
@@ -104,3 +111,19 @@ def picture(png: bytes, caption: str) -> Html:
 def bullets(items: Iterable[object]) -> Html:
     """A list."""
     return element("ul", joined((element("li", item) for item in items), ""))
+
+
+def drawn(figure: Figure, caption: str, record: Artefact) -> Html:
+    """Render a figure into the page.
+
+    Parameters
+    ----------
+    figure : Figure
+    caption : str
+    record : WorkspaceMap, BinMap or BinPlacement
+        What it shows; its hash is kept in the picture.
+    """
+    png = figure_bytes(
+        figure, "png", title=caption, config_sha256=record.stamp.config_sha256
+    )
+    return picture(png, caption)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from reachmap.maps.any_file import Artefact, kind_of
+from reachmap.maps.format.registry import Artefact, kind_of
 from reachmap.report.folder import RunFolder
 from reachmap.report.markup import Html, element, facts, joined, paragraph, section
 from reachmap.report.numbers import number

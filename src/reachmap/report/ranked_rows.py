@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from reachmap.ranking.ranked_list import TERM_NAMES
+from reachmap.ranking.answers.ranked_list import TERM_NAMES
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

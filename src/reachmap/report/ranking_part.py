@@ -8,12 +8,18 @@ from typing import Any
 import numpy as np
 
 from reachmap._typing import FloatArray
-from reachmap.maps.any_file import Artefact
+from reachmap.maps.format.registry import Artefact
 from reachmap.plots.ranking import MAX_GROUPS, TERM_LABELS, CostGroup, ranking_chart
-from reachmap.ranking.cost_groups import QUADRANT_ORDER
-from reachmap.ranking.ranked_list import TERM_NAMES
-from reachmap.report.drawing import drawn
-from reachmap.report.markup import Html, element, joined, paragraph, section, table
+from reachmap.ranking.answers.ranked_list import QUADRANT_ORDER, TERM_NAMES
+from reachmap.report.markup import (
+    Html,
+    drawn,
+    element,
+    joined,
+    paragraph,
+    section,
+    table,
+)
 from reachmap.report.numbers import NONE, count, number
 from reachmap.report.ranked_rows import RankedRow, ranked_rows, weights_of
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from reachmap._typing import FloatArray, IntArray
-from reachmap.cell.model import BinScanSpec, BinSpec, WorkspaceScanSpec
+from reachmap.cell.model.cell import BinScanSpec, BinSpec, WorkspaceScanSpec
 from reachmap.geometry import quaternion_wxyz_from_rotation, transform_from_parts
 from reachmap.sampling.lattice import Lattice, cube_lattice
 from reachmap.sampling.orientations import orientation_set

@@ -15,7 +15,7 @@ import numpy as np
 from reachmap._typing import FloatArray, IntArray
 
 if TYPE_CHECKING:
-    from reachmap.cell.model import CubeSpec
+    from reachmap.cell.model.cell import CubeSpec
 
 MATCH_TOLERANCE_M = 1e-6
 """Points closer than this along every axis are the same point [m]."""

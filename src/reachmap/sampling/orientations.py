@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from reachmap._typing import FloatArray
-from reachmap.cell.orientations import ConeFamily, ListFamily
+from reachmap.cell.model.orientations import ConeFamily, ListFamily
 from reachmap.geometry import AXES, rotation_from_rpy_deg
 
 

@@ -6,13 +6,13 @@ import dataclasses
 from collections.abc import Mapping
 from typing import Any
 
-from reachmap.core.connection import (
+from reachmap.core.planning.connection import (
     CHECKS_LARGE,
     CHECKS_SMALL,
     GOALS_PER_ATTEMPT,
     ROADMAP_PLANNER,
 )
-from reachmap.core.connectivity import NEIGHBOURS
+from reachmap.core.planning.roadmap import NEIGHBOURS
 from reachmap.core.scene import Scene
 from reachmap.maps import Provenance, Stamp, collect_provenance, config_sha256
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from reachmap._typing import FloatArray
-from reachmap.core.timing import (
+from reachmap.core.planning.timing import (
     execution_time_s,
     path_length_rad,
     polyline_length_m,
@@ -16,7 +16,7 @@ from reachmap.core.timing import (
 )
 
 if TYPE_CHECKING:
-    from reachmap.core.planning import PlanResult
+    from reachmap.core.planning.planner import PlanResult
     from reachmap.core.scene import Scene
 
 MEASURED = (
@@ -100,3 +100,22 @@ class _MotionNumbers:
     planned_length_rad: float
     tcp_length_m: float
     execution_time_s: float
+
+
+def attempt_seed(seed: int, *key: int) -> int:
+    """Seed of one attempt.
+
+    Parameters
+    ----------
+    seed : int
+        Of the scan.
+    *key : int
+        What tells the attempt from all others: frame, repeat.
+
+    Returns
+    -------
+    int
+        From 0 to 2³² − 1.
+    """
+    sequence = np.random.SeedSequence(seed, spawn_key=key)
+    return int(sequence.generate_state(1)[0])

@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from reachmap._typing import FloatArray
-from reachmap.cell.model import Cell
+from reachmap.cell.model.cell import Cell
+from reachmap.core.planning.timing import path_length_rad
 from reachmap.core.scene import Scene
-from reachmap.core.timing import path_length_rad
 from reachmap.maps import RunInfo, Status, WorkspaceMap, write_workspace_map
+from reachmap.runtime.work import Kind, Work
 from reachmap.sampling.frames import workspace_frames
 from reachmap.scans.document import journal_settings
-from reachmap.scans.seeds import attempt_seed
-from reachmap.scans.survey import survey_frames
-from reachmap.scans.work import Kind, Work
+from reachmap.scans.ik_survey import survey_frames
+from reachmap.scans.measured import attempt_seed
 from reachmap.scans.workspace_results import FrameResults, assemble_workspace_map
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from reachmap._typing import CodeArray, FloatArray, IntArray
-from reachmap.cell.model import Cell
+from reachmap.cell.model.cell import Cell
 from reachmap.maps import (
     CubeMap,
     RunInfo,

@@ -7,12 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from reachmap._typing import FloatArray, IntArray
-from reachmap.core.connection import ROADMAP_PLANNER, Connection, connect
-from reachmap.core.planning import Planner
+from reachmap.core.planning.connection import ROADMAP_PLANNER, Connection, connect
+from reachmap.core.planning.planner import Planner
 from reachmap.core.scene import Scene
 from reachmap.maps import Status
-from reachmap.scans.progress import Progress
-from reachmap.scans.survey import MAX_COUNT, Survey
+from reachmap.runtime.progress import Progress
+from reachmap.scans.ik_survey import MAX_COUNT, Survey
 from reachmap.scans.workspace_results import FrameResults
 
 

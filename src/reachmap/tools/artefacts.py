@@ -7,8 +7,8 @@ from pathlib import Path
 
 from reachmap.disk import is_there
 from reachmap.errors import MapFileError
-from reachmap.maps.any_file import Artefact, read_artefact
-from reachmap.scans.journal import journal_path
+from reachmap.maps.format.registry import Artefact, read_artefact
+from reachmap.runtime.journal.journal import journal_path
 
 _JOURNAL = re.compile(rb'[0-9a-f]{8} \{"format":"reachmap\.journal"')
 
@@ -38,7 +38,7 @@ def read_artefact_or_journal(path: Path) -> tuple[Artefact, bool]:
     """
     if is_journal(path):
         # Assembling a journal needs the scan's own code, engines included.
-        from reachmap.scans.results import preview
+        from reachmap.runtime.results import preview
 
         return preview(path), False
     journal = journal_path(path)

@@ -13,13 +13,12 @@ from reachmap._typing import BoolArray
 from reachmap.cell.loading import read_cell
 from reachmap.core.scene import Scene
 from reachmap.maps import BinMap, Status, read_placement, read_workspace_map
+from reachmap.runtime.progress import Progress
+from reachmap.runtime.run import run_scan
 from reachmap.sampling.frames import FrameGrid, bin_test_frames
 from reachmap.scans.bin_scan import CHECKS_UNCONNECTED, bin_work, plan_grasps
 from reachmap.scans.document import checking_settings, roadmap_settings, scan_document
-from reachmap.scans.progress import Progress
-from reachmap.scans.run import run_scan
-from reachmap.scans.survey import Survey, survey_frames
-from reachmap.scans.survey_run import SurveyContext, run_survey
+from reachmap.scans.ik_survey import Survey, SurveyContext, run_survey, survey_frames
 from reachmap.scans.workspace_roadmap import connect_survey
 from reachmap.tools.options import (
     IN_PROCESS,

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from reachmap.cell.loading import shipped_cells, stored_cell
-from reachmap.cell.references import text_at
-from reachmap.cell.yaml_text import MAX_TEXT_BYTES, parse_yaml, read_text
-from reachmap.cell.yaml_writer import cell_yaml
-from reachmap.maps.publish import check_output, publish
+from reachmap.cell.text.data import text_at
+from reachmap.cell.text.yaml_reader import MAX_TEXT_BYTES, parse_yaml, read_text
+from reachmap.cell.text.yaml_writer import cell_yaml
+from reachmap.maps.bytes.publish import check_output, publish
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

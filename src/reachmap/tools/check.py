@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from reachmap._typing import FloatArray
-from reachmap.cell.fields import Shape
 from reachmap.cell.loading import LoadedCell, read_cell
+from reachmap.cell.model.fields import Shape
 from reachmap.core.scene import Scene
 from reachmap.geometry import AXES
 

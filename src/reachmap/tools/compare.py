@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from reachmap.errors import GateFailedError, SettingsError
-from reachmap.maps.any_file import kind_of
-from reachmap.maps.comparison import Comparison, SquareChange, compare_maps
-from reachmap.maps.pose_matching import TOLERANCE_DEG, TOLERANCE_M, Frame
+from reachmap.maps.bytes.tree import json_ready
+from reachmap.maps.comparison.comparison import Comparison, SquareChange, compare_maps
+from reachmap.maps.comparison.pose_matching import TOLERANCE_DEG, TOLERANCE_M, Frame
+from reachmap.maps.format.registry import kind_of
 from reachmap.maps.records import BinMap, BinPlacement, WorkspaceMap
 from reachmap.tools.artefacts import read_artefact_or_journal
-from reachmap.tools.json_values import json_ready
 
 if TYPE_CHECKING:
     from reachmap.plots.comparison import MapChange
@@ -141,7 +141,7 @@ def draw(
         The files written.
     """
     from reachmap.plots.albums import comparison_album
-    from reachmap.plots.files import write_all
+    from reachmap.plots.parts.files import write_all
 
     items = comparison_album(map_change(comparison))
     folder, suffix = output, ".png"
@@ -160,7 +160,7 @@ def draw(
 def map_change(comparison: MapComparison) -> MapChange:
     """Bring a comparison into the form that pictures are drawn from."""
     from reachmap.plots.comparison import MapChange
-    from reachmap.plots.context import context_of
+    from reachmap.plots.parts.context import context_of
 
     squares, after = comparison.result.squares, comparison.after
     in_bin = isinstance(after, BinMap)

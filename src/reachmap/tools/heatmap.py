@@ -16,12 +16,12 @@ from reachmap.maps import (
 )
 from reachmap.maps.records import BinMap, BinPlacement, WorkspaceMap
 from reachmap.plots.albums import bin_album, placement_album, workspace_album
-from reachmap.plots.files import Picture, Table, write_all
-from reachmap.plots.levels import QUANTITIES, Quantity
-from reachmap.plots.style import Format, PercentMap
-from reachmap.ranking.costs import grasp_costs
-from reachmap.ranking.settings import RankSettings
-from reachmap.ranking.table import table_from_bin_map
+from reachmap.plots.parts.files import Picture, Table, write_all
+from reachmap.plots.parts.levels import QUANTITIES, Quantity
+from reachmap.plots.parts.style import Format, PercentMap
+from reachmap.ranking.lookup.costs import grasp_costs
+from reachmap.ranking.lookup.settings import RankSettings
+from reachmap.ranking.lookup.table import table_from_bin_map
 
 logger = logging.getLogger(__name__)
 

@@ -8,13 +8,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from reachmap.maps.any_file import Artefact, kind_of
-from reachmap.maps.bin_summary import BinSummary, summarise_bin
-from reachmap.maps.placement_summary import PlacementSummary, summarise_placement
+from reachmap.maps.bytes.tree import json_ready
+from reachmap.maps.format.registry import Artefact, kind_of
 from reachmap.maps.records import BinMap, WorkspaceMap
-from reachmap.maps.workspace_summary import WorkspaceSummary, summarise_workspace
+from reachmap.maps.summary.bin import BinSummary, summarise_bin
+from reachmap.maps.summary.placement import PlacementSummary, summarise_placement
+from reachmap.maps.summary.workspace import WorkspaceSummary, summarise_workspace
 from reachmap.tools.artefacts import read_artefact_or_journal
-from reachmap.tools.json_values import json_ready
 
 Summary: TypeAlias = WorkspaceSummary | BinSummary | PlacementSummary
 

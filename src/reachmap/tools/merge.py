@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from reachmap.scans.run import Outcome
-from reachmap.scans.shards import merge_journals
+from reachmap.runtime.merge import merge_journals
+from reachmap.runtime.run import Outcome
 
 
 def merge(shards: Sequence[Path], *, output: Path, overwrite: bool = False) -> Outcome:
-    """Join the journals of shards; see :func:`reachmap.scans.shards.merge_journals`.
+    """Join the journals of shards; see :func:`reachmap.runtime.merge.merge_journals`.
 
     Parameters
     ----------

@@ -11,10 +11,10 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from reachmap._typing import FloatArray
-from reachmap.cell.files import robot_text
+from reachmap.cell.files.files import robot_text
+from reachmap.cell.files.resources import SCHEME, NotFoundError, Resolver
+from reachmap.cell.files.urdf import UrdfDescription, parse_urdf
 from reachmap.cell.loading import LoadedCell, cell_from_text
-from reachmap.cell.model_paths import did_you_mean
-from reachmap.cell.resources import SCHEME, NotFoundError, Resolver
 from reachmap.cell.starter import (
     StarterChoices,
     approach_axis,
@@ -25,13 +25,13 @@ from reachmap.cell.starter import (
     starter_text,
     user_value,
 )
-from reachmap.cell.urdf import UrdfDescription, parse_urdf
-from reachmap.core.kinematics import Kinematics
-from reachmap.core.robot import RobotModel
+from reachmap.cell.text.messages import did_you_mean
+from reachmap.core.kinematics.kinematics import Kinematics
+from reachmap.core.robot.model import RobotModel
 from reachmap.core.scene import Scene
 from reachmap.errors import ReachmapError, SettingsError
 from reachmap.geometry import AXES
-from reachmap.maps.publish import check_output, publish
+from reachmap.maps.bytes.publish import check_output, publish
 
 SAMPLES = 2000
 MANY = 40

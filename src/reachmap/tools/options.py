@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from reachmap.cell.loading import cell_from_json
 from reachmap.maps import Provenance
-from reachmap.scans.journal import journal_path
+from reachmap.runtime.journal.journal import journal_path
 
 if TYPE_CHECKING:
     from reachmap.cell.loading import LoadedCell

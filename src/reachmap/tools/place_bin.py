@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from reachmap._typing import FloatArray
-from reachmap.core.bin_fit import BinFit
+from reachmap.core.collision.bin_fit import BinFit
+from reachmap.core.collision.camera import Camera
 from reachmap.core.scene import Scene
-from reachmap.core.sight import Camera
 from reachmap.errors import SettingsError
 from reachmap.geometry import yaw_transform
 from reachmap.maps import (
@@ -25,25 +25,30 @@ from reachmap.maps import (
     write_placement,
 )
 from reachmap.maps.records import Stamp
-from reachmap.placement.decision import Decision, decide_as_given, decide_by_paper
-from reachmap.placement.evaluator import open_evaluator
-from reachmap.placement.exact import Pose
-from reachmap.placement.imaging import can_choose
-from reachmap.placement.outcome import Outcome, settle
-from reachmap.placement.question import Question
-from reachmap.placement.region import AXES, Region, region_of
-from reachmap.placement.sample import open_frames
+from reachmap.placement.decision import (
+    Decision,
+    Outcome,
+    decide_as_given,
+    decide_by_paper,
+    settle,
+)
+from reachmap.placement.mapped.evaluator import open_evaluator
+from reachmap.placement.mapped.exact import Pose
+from reachmap.placement.mapped.imaging import can_choose
+from reachmap.placement.mapped.sample import open_frames
+from reachmap.placement.mapped.viewpoints import picture_corners
+from reachmap.placement.predicted.region import AXES, Region, region_of
+from reachmap.placement.problem import Question
 from reachmap.placement.search import decide_by_search
 from reachmap.placement.settings import placement_settings
 from reachmap.placement.summary import best_rows, placement_facts, row_facts
-from reachmap.placement.viewpoints import picture_corners
+from reachmap.runtime.progress import Progress
 from reachmap.scans.document import (
     checking_settings,
     provenance_from_document,
     roadmap_settings,
     scan_document,
 )
-from reachmap.scans.progress import Progress
 from reachmap.tools.options import IN_PROCESS, RunOptions, cell_of_artefact, with_seed
 
 if TYPE_CHECKING:
@@ -277,8 +282,8 @@ def _draw(
     question: Question,
     run: RunOptions,
 ) -> None:
+    from reachmap.plots.parts.style import figure_bytes
     from reachmap.plots.placement import draw_placement
-    from reachmap.plots.style import figure_bytes
 
     figure = draw_placement(
         placement, workspace, camera_view=_camera_view(placement, question)

@@ -10,19 +10,22 @@ from typing import Any
 
 from reachmap.errors import MapFileError, SettingsError
 from reachmap.maps import read_bin_map
-from reachmap.maps.publish import check_output, publish
+from reachmap.maps.bytes.publish import check_output, publish
 from reachmap.maps.records import BinMap
-from reachmap.ranking.cost_groups import cost_groups
-from reachmap.ranking.explain import explanation, find_grasp
-from reachmap.ranking.grasp_arrays import GraspList
-from reachmap.ranking.grasps import STDIN, read_grasps
-from reachmap.ranking.order import OUTSIDE_MAP
-from reachmap.ranking.pipeline import pose_from_numbers, rank_list
-from reachmap.ranking.rank_files import check_targets, joined, write_lists
-from reachmap.ranking.rank_text import TABLE_ROWS, ranking_table
-from reachmap.ranking.ranked_list import RankedList, document_text, ranked_document
-from reachmap.ranking.ranker import Ranker
-from reachmap.ranking.settings import RankSettings
+from reachmap.ranking.answers.explain import explanation, find_grasp
+from reachmap.ranking.answers.files import check_targets, joined, write_lists
+from reachmap.ranking.answers.pipeline import pose_from_numbers, rank_list
+from reachmap.ranking.answers.ranked_list import (
+    RankedList,
+    cost_groups,
+    document_text,
+    ranked_document,
+)
+from reachmap.ranking.lists.arrays import GraspList
+from reachmap.ranking.lists.reading import STDIN, read_grasps
+from reachmap.ranking.lookup.order import OUTSIDE_MAP
+from reachmap.ranking.lookup.ranker import Ranker
+from reachmap.ranking.lookup.settings import RankSettings
 
 logger = logging.getLogger(__name__)
 
@@ -34,7 +37,7 @@ class ListFormat:
     Attributes
     ----------
     name : str or None
-        One of :data:`reachmap.ranking.importers.FORMATS`; None looks at the content.
+        One of :data:`.importers.FORMATS`; None looks at the content.
     frame : str or None
         Frame of imported lists.
     frame_pose : sequence of 7 float, or None
@@ -59,8 +62,8 @@ class RankAnswer:
         One re-ordered grasp list for each one supplied.
     text : str
         The documents as JSON: one, or a list of several.
-    table : str
-        The best of each list, for a terminal.
+    ranked : tuple of RankedList
+        One ranking for each list.
     explanation : str
         The story of the grasp that was asked about, or "".
     written : tuple of Path
@@ -68,7 +71,7 @@ class RankAnswer:
 
     documents: tuple[Mapping[str, Any], ...]
     text: str
-    table: str
+    ranked: tuple[RankedList, ...]
     explanation: str = ""
     written: tuple[Path, ...] = ()
 
@@ -141,7 +144,7 @@ def rank(
     return RankAnswer(
         documents=tuple(documents),
         text=joined(texts),
-        table="\n\n".join(_tables(ranked, top)),
+        ranked=tuple(ranked),
         explanation=story,
         written=(*targets, *([] if chart is None else [chart])),
     )
@@ -176,7 +179,7 @@ def _check_cell(
 ) -> None:
     # Imported here: reading cells takes longer than ranking.
     from reachmap.cell.loading import read_cell
-    from reachmap.ranking.cell_check import differing_sections
+    from reachmap.ranking.answers.cell_check import differing_sections
 
     different = differing_sections(bin_map, read_cell(cell, overrides))
     if not different:
@@ -221,16 +224,6 @@ def _rank_one(
     return ranked
 
 
-def _tables(ranked: Sequence[RankedList], top: int | None) -> list[str]:
-    tables = [ranking_table(one, top or TABLE_ROWS) for one in ranked]
-    if len(ranked) == 1:
-        return tables
-    return [
-        f"{one.grasps.source}\n{table}"
-        for one, table in zip(ranked, tables, strict=True)
-    ]
-
-
 def _draw(
     chart: Path,
     ranked: Sequence[RankedList],
@@ -240,8 +233,8 @@ def _draw(
     overwrite: bool,
 ) -> None:
     # Imported here: drawing takes longer than ranking.
+    from reachmap.plots.parts.style import figure_bytes
     from reachmap.plots.ranking import CostGroup, ranking_chart
-    from reachmap.plots.style import figure_bytes
 
     groups = [
         CostGroup(label=label, supplied=supplied, ranked=best_first)

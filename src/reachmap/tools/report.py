@@ -6,7 +6,7 @@ from pathlib import Path
 
 from reachmap.cell.loaded import LoadedCell
 from reachmap.errors import CellError
-from reachmap.maps.publish import check_output, publish
+from reachmap.maps.bytes.publish import check_output, publish
 from reachmap.report.folder import RunFolder, read_run_folder
 from reachmap.report.page import report_page
 from reachmap.tools.options import cell_of_artefact

@@ -6,7 +6,7 @@ import json
 from importlib import resources
 from typing import Any, Literal
 
-from reachmap.cell.json_schema import cell_schema
+from reachmap.cell.model.cell import cell_schema
 
 SchemaName = Literal["cell", "grasps"]
 

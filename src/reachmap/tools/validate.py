@@ -12,17 +12,16 @@ from reachmap.core.scene import Scene
 from reachmap.disk import real_path
 from reachmap.errors import GraspListError, SettingsError
 from reachmap.maps import read_bin_map
-from reachmap.maps.publish import check_output, publish
+from reachmap.maps.bytes.publish import check_output, publish
 from reachmap.maps.records import BinMap
-from reachmap.ranking.grasps import STDIN
-from reachmap.ranking.pipeline import pose_from_numbers, rank_list
-from reachmap.ranking.ranked_list import RankedList
-from reachmap.ranking.ranker import Ranker
-from reachmap.ranking.settings import RankSettings
-from reachmap.scans.progress import Progress
+from reachmap.ranking.answers.pipeline import pose_from_numbers, rank_list
+from reachmap.ranking.answers.ranked_list import RankedList
+from reachmap.ranking.lists.reading import STDIN
+from reachmap.ranking.lookup.ranker import Ranker
+from reachmap.ranking.lookup.settings import RankSettings
+from reachmap.runtime.progress import Progress
 from reachmap.tools.options import IN_PROCESS, RunOptions, cell_of_artefact
 from reachmap.tools.rank import ListFormat, read_list
-from reachmap.tools.validate_text import validation_text
 from reachmap.validation.facts import facts_of
 from reachmap.validation.judgement import judge_list
 from reachmap.validation.picks import NO_PICKS, join_picks, picks_of
@@ -66,13 +65,10 @@ class ValidateAnswer:
     validation : Validation
     facts : mapping
         Its summary as JSON values.
-    text : str
-        The same as tables.
     """
 
     validation: Validation
     facts: dict[str, Any]
-    text: str
 
 
 def validate(
@@ -153,7 +149,6 @@ def validate(
     return ValidateAnswer(
         validation=validation,
         facts=facts_of(validation),
-        text=validation_text(validation),
     )
 
 
@@ -280,7 +275,7 @@ def _write(
         publish(output, [text.encode("ascii"), b"\n"], overwrite=overwrite)
     if chart is not None:
         # Imported here: drawing is asked for seldom.
-        from reachmap.plots.style import figure_bytes
+        from reachmap.plots.parts.style import figure_bytes
         from reachmap.plots.validation import validation_chart
 
         data = figure_bytes(

@@ -8,9 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from reachmap.errors import MapFileError
-from reachmap.maps.storage import is_sealed, load
+from reachmap.maps.format.registry import load_any
+from reachmap.maps.format.store import is_sealed
+from reachmap.text import plural
 from reachmap.tools.artefacts import is_journal
-from reachmap.tools.text_table import plural
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -97,7 +98,7 @@ def _verdict(path: Path) -> Verdict:
 
 
 def _artefact(path: Path) -> Verdict:
-    tree, layout = load(path)
+    tree, layout = load_any(path)
     facts = {
         "format": str(tree.attributes["format_version"]),
         "variables": sum(1 for _ in tree.arrays()),
@@ -108,7 +109,7 @@ def _artefact(path: Path) -> Verdict:
 
 
 def _journal(path: Path) -> Verdict:
-    from reachmap.scans.journal_entries import read_journal
+    from reachmap.runtime.journal.entries import read_journal
 
     with read_journal(path) as entries:
         own = len(entries.header.own_units())

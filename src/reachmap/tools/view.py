@@ -11,8 +11,8 @@ from pathlib import Path
 
 from reachmap.cell.loading import SUFFIXES, LoadedCell, read_cell, shipped_cells
 from reachmap.errors import SettingsError
-from reachmap.maps.any_file import Artefact, read_artefact
-from reachmap.maps.publish import check_output, publish
+from reachmap.maps.bytes.publish import check_output, publish
+from reachmap.maps.format.registry import Artefact, read_artefact
 from reachmap.maps.records import BinMap
 from reachmap.tools.options import cell_of_artefact
 from reachmap.view.engine import HOST, require_viewer, start_server, stop_server
@@ -77,7 +77,7 @@ def view(
     if page is not None:
         check_output(page, overwrite=overwrite)
     # Imported here: without the extra there is nothing to load the engines for.
-    from reachmap.core.solids import SolidCell
+    from reachmap.core.collision.solids import SolidCell
 
     record, loaded = _read(source)
     paths = _paths(record, test_grasps)

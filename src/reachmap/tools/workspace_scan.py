@@ -19,13 +19,12 @@ from reachmap.maps import (
     check_output,
     write_workspace_map,
 )
-from reachmap.maps.statistics import level_means
+from reachmap.maps.summary.statistics import level_means
+from reachmap.runtime.progress import Progress
+from reachmap.runtime.run import run_scan
 from reachmap.sampling.frames import workspace_frames
 from reachmap.scans.document import checking_settings, roadmap_settings, scan_document
-from reachmap.scans.progress import Progress
-from reachmap.scans.run import run_scan
-from reachmap.scans.survey import survey_frames
-from reachmap.scans.survey_run import SurveyContext, run_survey
+from reachmap.scans.ik_survey import SurveyContext, run_survey, survey_frames
 from reachmap.scans.workspace_per_frame import per_frame_work, plan_frames
 from reachmap.scans.workspace_results import assemble_workspace_map
 from reachmap.scans.workspace_roadmap import connect_survey, results_of_connection

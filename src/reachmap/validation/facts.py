@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from reachmap.ranking.ranked_list import status_name
-from reachmap.ranking.table import TERMS
+from reachmap.ranking.answers.ranked_list import status_name
+from reachmap.ranking.lookup.table import TERMS
 from reachmap.scans.measured import MEASURED
 from reachmap.validation.judgement import JudgedList
 from reachmap.validation.statistics import Confusion

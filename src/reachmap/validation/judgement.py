@@ -9,10 +9,9 @@ import numpy as np
 
 from reachmap._typing import BoolArray, CodeArray, FloatArray, IntArray
 from reachmap.maps.records import BinMap, freeze
-from reachmap.ranking.cost_groups import QUADRANT_ORDER
-from reachmap.ranking.order import OUTSIDE_MAP
-from reachmap.ranking.ranked_list import RankedList
-from reachmap.ranking.ranker import Ranker
+from reachmap.ranking.answers.ranked_list import QUADRANT_ORDER, RankedList
+from reachmap.ranking.lookup.order import OUTSIDE_MAP
+from reachmap.ranking.lookup.ranker import Ranker
 from reachmap.scans.measured import MEASURED
 from reachmap.validation.planning import PickResults
 

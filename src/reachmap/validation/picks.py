@@ -10,8 +10,8 @@ from scipy.spatial.transform import Rotation
 from reachmap._typing import BoolArray, FloatArray, IntArray
 from reachmap.geometry import rotation_from_quaternion_wxyz, transform_from_parts
 from reachmap.maps.records import freeze
-from reachmap.ranking.approach import align
-from reachmap.ranking.ranked_list import RankedList
+from reachmap.ranking.answers.ranked_list import RankedList
+from reachmap.ranking.lookup.approach import align
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -10,14 +10,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from reachmap._typing import CodeArray, FloatArray, IntArray
-from reachmap.core.planning import PlanResult
+from reachmap.core.planning.planner import PlanResult
 from reachmap.core.scene import Scene
 from reachmap.maps.records import NO_PAIR, Status, freeze
-from reachmap.scans.measured import MEASURED, Meter
-from reachmap.scans.parallel import compute_units
-from reachmap.scans.progress import Progress
-from reachmap.scans.seeds import attempt_seed
-from reachmap.scans.survey import Survey, survey_frames
+from reachmap.runtime.parallel import compute_units
+from reachmap.runtime.progress import Progress
+from reachmap.scans.ik_survey import Survey, survey_frames
+from reachmap.scans.measured import MEASURED, Meter, attempt_seed
 from reachmap.validation.picks import Picks, tool_poses
 
 if TYPE_CHECKING:

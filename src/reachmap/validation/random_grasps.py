@@ -7,10 +7,10 @@ import numpy as np
 from reachmap._typing import FloatArray
 from reachmap.errors import SettingsError
 from reachmap.maps.records import BinMap
-from reachmap.ranking.grasp_arrays import GraspList
-from reachmap.ranking.grasp_document import FORMAT
-from reachmap.ranking.grasps import grasps_from_document
-from reachmap.ranking.table import GraspTable, table_from_bin_map
+from reachmap.ranking.lists.arrays import GraspList
+from reachmap.ranking.lists.document import FORMAT
+from reachmap.ranking.lists.reading import grasps_from_document
+from reachmap.ranking.lookup.table import GraspTable, table_from_bin_map
 
 MAX_RANDOM = 100_000
 

@@ -9,7 +9,7 @@ import numpy as np
 from scipy import stats
 
 from reachmap._typing import BoolArray, FloatArray, IntArray
-from reachmap.maps.statistics import wilson_interval
+from reachmap.maps.summary.statistics import wilson_interval
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -10,18 +10,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from reachmap._typing import FloatArray, IntArray
+from reachmap.core.collision.solids import SolidCell
 from reachmap.core.scene import Scene
-from reachmap.core.solids import SolidCell
 from reachmap.errors import ReachmapError
 from reachmap.geometry import yaw_transform
-from reachmap.maps.any_file import Artefact
+from reachmap.maps.format.registry import Artefact
 from reachmap.maps.records import BinMap, BinPlacement, WorkspaceMap
-from reachmap.maps.statistics import best_level
+from reachmap.maps.summary.statistics import best_level
+from reachmap.view.inspect_frame import Answer, answer, best_first
+from reachmap.view.page import has_bin, headline
 from reachmap.view.playback import Playback, choose_paths, playback_of
 from reachmap.view.points import EVERYTHING, points_of
-from reachmap.view.question import Answer, answer, best_first
 from reachmap.view.stage import Stage
-from reachmap.view.words import has_bin, headline
 
 if TYPE_CHECKING:
     import viser

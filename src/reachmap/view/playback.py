@@ -8,8 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from reachmap._typing import FloatArray
-from reachmap.core.robot import RobotModel
-from reachmap.core.timing import merge_straight, segment_times_s, straight_way_time_s
+from reachmap.core.planning.timing import (
+    merge_straight,
+    segment_times_s,
+    straight_way_time_s,
+)
+from reachmap.core.robot.model import RobotModel
 from reachmap.errors import SettingsError
 from reachmap.maps.records import BinMap
 from reachmap.view.points import shortest_paths
@@ -104,7 +108,7 @@ def _eased(
 ) -> tuple[FloatArray, FloatArray]:
     """Points of a way from rest to rest in a time, (k, dof), and their times (k,).
 
-    Speed is the trapezoid that :func:`reachmap.core.timing.segment_times_s` times: with
+    Speed is the trapezoid that :func:`.segment_times_s` times: with
     the bounds V and A of the share of the way, each ramp takes V/A.
     """
     count = max(2, round(time_s * FRAMES_PER_S) + 1)

@@ -8,10 +8,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from reachmap._typing import BoolArray, CodeArray, FloatArray, IntArray
-from reachmap.maps.any_file import Artefact
+from reachmap.maps.format.registry import Artefact
 from reachmap.maps.records import BinMap, BinPlacement, Status, WorkspaceMap, freeze
-from reachmap.maps.statistics import STATUS_NAMES
-from reachmap.plots.levels import level_names
+from reachmap.maps.summary.statistics import STATUS_NAMES
+from reachmap.plots.parts.levels import level_names
 
 EVERYTHING = "all points"
 

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from reachmap._typing import CodeArray, FloatArray, IntArray
-from reachmap.core.solids import Solid, SolidCell
+from reachmap.core.collision.solids import Solid, SolidCell
 from reachmap.geometry import quaternion_wxyz_from_rotation
-from reachmap.plots.cell_colours import BIN, BLOCKING, solid_colours
-from reachmap.plots.style import NOT_ATTEMPTED, colour_map
+from reachmap.plots.cell.cell_colours import BIN, BLOCKING, solid_colours
+from reachmap.plots.parts.style import NOT_ATTEMPTED, colour_map
 from reachmap.view.points import MapPoints
 
 if TYPE_CHECKING:

@@ -1,0 +1,58 @@
+"""Tables and paragraphs for a terminal."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Mapping, Sequence
+
+WIDTH = 88
+
+
+def table_lines(rows: Sequence[Sequence[str]], align: str) -> list[str]:
+    r"""Lay out rows in columns, two spaces apart and two from the margin.
+
+    Parameters
+    ----------
+    rows : sequence of rows of texts
+    align : str
+        ``<`` or ``>`` for each column.
+
+    Examples
+    --------
+    >>> print("\n".join(table_lines([["z", "percent"], ["+0.1", "53.5"]], "<>")))
+      z     percent
+      +0.1     53.5
+    """
+    widths = [max(len(row[k]) for row in rows) for k in range(len(align))]
+    return [
+        "  "
+        + "  ".join(
+            f"{text:{side}{width}}"
+            for text, side, width in zip(row, align, widths, strict=True)
+        ).rstrip()
+        for row in rows
+    ]
+
+
+def fact_lines(facts: Sequence[tuple[str, str]]) -> list[str]:
+    """Names in one column, what is said of them in another, wrapped to the width."""
+    column = max((len(name) for name, _ in facts), default=0) + 4
+    lines = []
+    for name, text in facts:
+        lines += textwrap.wrap(
+            text or "-",
+            WIDTH,
+            initial_indent=f"  {name:{column - 2}}",
+            subsequent_indent=" " * column,
+            break_long_words=False,
+            break_on_hyphens=False,
+        )
+    return lines
+
+
+def facts_text(facts: Mapping[str, object]) -> str:
+    """One line per fact: its name, with spaces, and its value in one column."""
+    width = max(len(key) for key in facts)
+    return "\n".join(
+        f"{key.replace('_', ' '):{width}}  {value}" for key, value in facts.items()
+    )

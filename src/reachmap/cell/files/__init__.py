@@ -1,0 +1,1 @@
+"""Files that a cell names: URDF, SRDF, joint limits, meshes, packages."""

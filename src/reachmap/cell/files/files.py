@@ -1,0 +1,253 @@
+"""Reading the files a cell refers to: URDF or xacro, SRDF, limits, meshes."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from reachmap._typing import FloatArray
+from reachmap.cell.files.joint_limits import MoveItLimits, parse_joint_limits
+from reachmap.cell.files.meshes import MeshError, mesh_size
+from reachmap.cell.files.resources import NotFoundError, Resolver, search_folders
+from reachmap.cell.files.srdf import SrdfDescription, parse_srdf
+from reachmap.cell.files.urdf import MAX_URDF_BYTES, UrdfDescription, parse_urdf
+from reachmap.cell.text.data import at, entries, text_at
+from reachmap.cell.text.yaml_reader import (
+    MAX_TEXT_BYTES,
+    Document,
+    Location,
+    read_bytes,
+    read_text,
+)
+from reachmap.disk import is_folder
+from reachmap.errors import CellError, MissingExtraError
+
+
+def expand_xacro(path: Path, arguments: Mapping[str, str], resolver: Resolver) -> str:
+    """Expand a xacro file.
+
+    A xacro file is a program (its ``${…}`` are Python expressions): expand only those
+    you trust. ``$(find NAME)`` looks where ``package://NAME`` does.
+
+    Raises
+    ------
+    MissingExtraError
+        xacrodoc is not installed.
+    CellError
+        The file does not expand.
+    """
+    try:
+        from xacrodoc import XacroDoc, packages
+    except ImportError:
+        raise MissingExtraError(
+            f"{path}: xacro files need the extra [xacro]; "
+            "install it with: pip install 'reachmap-cells[xacro]'"
+        ) from None
+    packages.reset()
+    packages.look_in([str(folder) for folder in search_folders() if is_folder(folder)])
+    packages.update_package_cache(
+        {
+            name: str(resolver.directory / folder)
+            for name, folder in resolver.packages.items()
+        }
+    )
+    try:
+        document = XacroDoc.from_file(
+            str(path), subargs=dict(arguments), resolve_packages=False
+        )
+        # Not to_urdf_string(): it would turn relative mesh paths into paths of this
+        # machine, and the text would not be the same elsewhere.
+        return str(document.dom.toprettyxml(indent="  "))
+    except Exception as error:  # xacro raises whatever its expressions raise
+        lines = str(error).strip().splitlines()
+        reason = lines[0] if lines else type(error).__name__
+        raise CellError(f"{path}: xacro cannot be expanded: {reason}") from None
+    finally:
+        packages.reset()
+
+
+MAX_MESH_BYTES = 100_000_000
+
+
+@dataclass(slots=True, kw_only=True)
+class CellFiles:
+    """Texts and files found; None or empty where a mistake was recorded."""
+
+    resolver: Resolver
+    urdf: str = ""
+    urdf_folder: Path | None = None
+    urdf_root: Path | None = None
+    robot: UrdfDescription | None = None
+    srdf: str = ""
+    srdf_description: SrdfDescription | None = None
+    joint_limits: dict[str, MoveItLimits] = field(default_factory=dict)
+    mesh_paths: dict[str, Path] = field(default_factory=dict)
+    files_sha256: dict[str, str] = field(default_factory=dict)
+    mesh_sizes: dict[str, FloatArray] = field(default_factory=dict)
+
+    def add_mesh(self, key: str, path: Path) -> None:
+        """Record a mesh by its key, with its size and the sha256 of its bytes."""
+        data = read_bytes(path, limit=MAX_MESH_BYTES)
+        self.mesh_paths[key] = path
+        self.files_sha256[key] = hashlib.sha256(data).hexdigest()
+        try:
+            self.mesh_sizes[key] = mesh_size(data, path.suffix)
+        except MeshError as error:
+            raise CellError(f"mesh {path}: {error}") from None
+
+
+def read_files(document: Document, directory: Path) -> CellFiles:
+    """Find and read everything the data of a cell refers to.
+
+    Every failure becomes a mistake at the place of the reference.
+    """
+    packages = at(document.data, "resources", "packages")
+    named = packages if isinstance(packages, dict) else {}
+    folders = {k: v for k, v in named.items() if isinstance(v, str)}
+    for name, folder in folders.items():
+        if not is_folder(directory / folder):
+            document.add(
+                ("resources", "packages", name), f"no such folder: {directory / folder}"
+            )
+    files = CellFiles(resolver=Resolver(directory=directory, packages=folders))
+    _read_urdf(document, files)
+    _read_srdf(document, files)
+    _read_joint_limits(document, files)
+    _find_urdf_meshes(document, files)
+    _find_body_meshes(document, files)
+    return files
+
+
+def stored_files(document: Document, *, urdf: str, srdf: str) -> CellFiles:
+    """Files of a cell from an artefact: texts as stored, meshes from this machine."""
+    packages = at(document.data, "resources", "packages") or {}
+    files = CellFiles(resolver=Resolver(directory=Path.cwd(), packages=packages))
+    files.urdf, files.srdf = urdf, srdf
+    try:
+        files.robot = parse_urdf(urdf, "stored URDF")
+        if srdf:
+            files.srdf_description = parse_srdf(srdf, "stored SRDF", files.robot)
+    except CellError as error:
+        _add(document, ("robot", "urdf"), error)
+        return files
+    try:
+        reference = text_at(document.data, "robot", "urdf") or ""
+        path, root = files.resolver.resolve_robot(reference)
+        files.urdf_folder, files.urdf_root = path.parent, root
+    except NotFoundError:
+        # The text is at hand; only meshes relative to it would be missing.
+        files.urdf_folder = files.urdf_root = Path.cwd()
+    _find_urdf_meshes(document, files)
+    _find_body_meshes(document, files)
+    return files
+
+
+def compare_hashes(
+    document: Document, files: CellFiles, expected: Mapping[str, str]
+) -> None:
+    """Add a mistake for each mesh whose bytes are not the expected ones."""
+    for key, digest in expected.items():
+        found = files.files_sha256.get(key)
+        if found is not None and found != digest:
+            path = files.mesh_paths[key]
+            document.add(
+                (),
+                f"mesh {key!r} has changed since: {path} has sha256 {found[:12]}…, "
+                f"expected {digest[:12]}…",
+            )
+
+
+def robot_text(path: Path, arguments: Mapping[str, str], resolver: Resolver) -> str:
+    """Text of a URDF or SRDF file, xacro expanded."""
+    if path.suffix == ".xacro":
+        return expand_xacro(path, arguments, resolver)
+    return read_text(path, limit=MAX_URDF_BYTES)
+
+
+def body_key(name: str, reference: str) -> str:
+    """Key of a body's mesh in ``files_sha256``: the same on every machine."""
+    return f"body {name}: {reference.rsplit('/', 1)[-1]}"
+
+
+def _add(document: Document, location: Location, error: Exception) -> None:
+    lines = error.lines if isinstance(error, CellError) else (str(error),)
+    for line in lines:
+        document.add(location, line)
+
+
+def _read_urdf(document: Document, files: CellFiles) -> None:
+    location = ("robot", "urdf")
+    reference = text_at(document.data, *location)
+    if not reference:
+        return
+    try:
+        path, root = files.resolver.resolve_robot(reference)
+        files.urdf = robot_text(path, _xacro_args(document), files.resolver)
+        files.urdf_folder, files.urdf_root = path.parent, root
+        files.robot = parse_urdf(files.urdf, path.name)
+    except (NotFoundError, CellError) as error:
+        _add(document, location, error)
+
+
+def _xacro_args(document: Document) -> Mapping[str, str]:
+    given = at(document.data, "robot", "xacro_args")
+    if not isinstance(given, dict):
+        return {}
+    return {
+        key: str(value).lower() if isinstance(value, bool) else str(value)
+        for key, value in given.items()
+    }
+
+
+def _read_srdf(document: Document, files: CellFiles) -> None:
+    location = ("robot", "srdf")
+    reference = text_at(document.data, *location)
+    if reference is None or files.robot is None:
+        return
+    try:
+        path = files.resolver.resolve(reference)
+        files.srdf = robot_text(path, _xacro_args(document), files.resolver)
+        files.srdf_description = parse_srdf(files.srdf, path.name, files.robot)
+    except (NotFoundError, CellError) as error:
+        _add(document, location, error)
+
+
+def _read_joint_limits(document: Document, files: CellFiles) -> None:
+    location = ("robot", "joint_limits")
+    reference = text_at(document.data, *location)
+    if reference is None:
+        return
+    try:
+        path = files.resolver.resolve(reference)
+        text = read_text(path, limit=MAX_TEXT_BYTES)
+        files.joint_limits = parse_joint_limits(text, path.name)
+    except (NotFoundError, CellError) as error:
+        _add(document, location, error)
+
+
+def _find_urdf_meshes(document: Document, files: CellFiles) -> None:
+    if files.robot is None or files.urdf_folder is None or files.urdf_root is None:
+        return
+    for reference in files.robot.collision_meshes:
+        try:
+            path = files.resolver.resolve_from_urdf(
+                reference, files.urdf_folder, files.urdf_root
+            )
+            files.add_mesh(reference, path)
+        except (NotFoundError, CellError) as error:
+            _add(document, ("robot", "urdf"), error)
+
+
+def _find_body_meshes(document: Document, files: CellFiles) -> None:
+    for index, body in enumerate(entries(document.data, "bodies")):
+        reference = text_at(body, "shape", "mesh", "file")
+        if not reference:
+            continue
+        name = text_at(body, "name") or str(index)
+        try:
+            path = files.resolver.resolve(reference)
+            files.add_mesh(body_key(name, reference), path)
+        except (NotFoundError, CellError) as error:
+            _add(document, ("bodies", index, "shape", "mesh", "file"), error)

@@ -1,0 +1,1 @@
+"""The typed description of a cell: its sections, keys, ranges and defaults."""

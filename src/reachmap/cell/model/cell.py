@@ -1,0 +1,138 @@
+"""The robot cell: one frozen, validated record for everything in the YAML file."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+from pydantic import Field, model_validator
+
+from reachmap.cell.model.bodies import BinSpec, BodySpec, CameraSpec
+from reachmap.cell.model.fields import (
+    Angle,
+    Identifier,
+    Name,
+    NonNegative,
+    Positive,
+    Record,
+)
+from reachmap.cell.model.planner import PlannerSpec
+from reachmap.cell.model.robot import IkSpec, JointLimits, Resources, RobotSpec, TcpSpec
+from reachmap.cell.model.scans import (
+    BinScanSpec,
+    CubeSpec,
+    PlacementSpec,
+    WorkspaceScanSpec,
+)
+
+__all__ = [
+    "BinScanSpec",
+    "BinSpec",
+    "BodySpec",
+    "CameraSpec",
+    "Cell",
+    "CollisionSpec",
+    "CubeSpec",
+    "IkSpec",
+    "JointLimits",
+    "PlacementSpec",
+    "Resources",
+    "RobotSpec",
+    "ScanConfiguration",
+    "TcpSpec",
+    "WorkspaceScanSpec",
+]
+
+
+class ScanConfiguration(Record):
+    """Joint values the picking cycle starts from; exactly one of the three."""
+
+    q_deg: dict[str, Angle] | None = Field(
+        None, description="Joint to position [deg; m for a prismatic joint]."
+    )
+    q_rad: dict[str, Angle] | None = Field(
+        None, description="Joint to position [rad; m for a prismatic joint]."
+    )
+    group_state: Name | None = Field(None, description="A group_state of the SRDF.")
+
+    @model_validator(mode="after")
+    def _exactly_one(self) -> ScanConfiguration:
+        given = [n for n in type(self).model_fields if getattr(self, n) is not None]
+        if len(given) != 1:
+            raise ValueError(
+                "give exactly one of q_deg, q_rad, group_state "
+                f"(got {', '.join(given) or 'none'})"
+            )
+        return self
+
+
+class CollisionSpec(Record):
+    """The two resolutions of a free motion, and the margin on every pair."""
+
+    planning_step_rad: Positive = Field(
+        0.05, ge=1e-4, le=0.5, description="Joint-space step while searching [rad]."
+    )
+    verification_distance_m: Positive = Field(
+        0.004,
+        ge=1e-5,
+        le=0.1,
+        description="No point moves more than this between two checks [m].",
+    )
+    safety_margin_m: NonNegative = Field(
+        0.002, le=0.1, description="Clearance that every pair of bodies keeps [m]."
+    )
+
+
+class Cell(Record):
+    """A robot cell with everything needed to scan it."""
+
+    format: Literal["reachmap.cell"] = Field(description="Marks a cell file.")
+    format_version: str = Field(
+        pattern=r"^1\.[0-9]{1,6}$",
+        description='Version of the format, in quotes: "1.0".',
+    )
+    name: Identifier = Field(description="Name of the cell.")
+    description: str = Field("", max_length=2000, description="One line for people.")
+    resources: Resources = Field(Resources(), description="Where files are looked up.")
+    robot: RobotSpec = Field(description="The arm.")
+    camera: CameraSpec | None = Field(
+        None, description="The 3D camera, if there is one."
+    )
+    bodies: tuple[BodySpec, ...] = Field(
+        (), max_length=1000, description="Everything solid that is not in the URDF."
+    )
+    bin: BinSpec = Field(description="The bin that is picked from.")
+    scan_configuration: ScanConfiguration = Field(
+        description="Where the arm images the bin, and every path starts."
+    )
+    collision: CollisionSpec = Field(
+        CollisionSpec(), description="Resolution of collision checking."
+    )
+    workspace_scan: WorkspaceScanSpec = Field(description="The workspace scan.")
+    bin_scan: BinScanSpec = Field(BinScanSpec(), description="The bin scan.")
+    planner: PlannerSpec = Field(PlannerSpec(), description="The planner.")
+    placement: PlacementSpec = Field(
+        PlacementSpec(), description="Limits that place-bin keeps to."
+    )
+    seed: int = Field(1, ge=0, lt=2**63, description="Seed of everything random.")
+
+    @model_validator(mode="after")
+    def _names_differ(self) -> Cell:
+        names = [body.name for body in self.bodies]
+        repeated = sorted({name for name in names if names.count(name) > 1})
+        if repeated:
+            raise ValueError(f"bodies need different names (repeated: {repeated})")
+        return self
+
+
+DIALECT = "https://json-schema.org/draft/2020-12/schema"
+
+
+def cell_schema() -> dict[str, Any]:
+    """JSON Schema (draft 2020-12) of a cell, generated from the model."""
+    schema = Cell.model_json_schema()
+    head = {
+        "$schema": DIALECT,
+        "$id": "reachmap/cell-1.schema.json",
+        "title": "reachmap cell 1.x",
+    }
+    return {**head, **{key: schema[key] for key in schema if key not in head}}

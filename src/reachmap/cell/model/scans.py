@@ -1,0 +1,133 @@
+"""The two scans as a cell describes them, and where the bin may go."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import Field, model_validator
+
+from reachmap.cell.model.fields import (
+    AngleRange,
+    Coordinate,
+    Length,
+    LengthRange,
+    Record,
+    Vector3,
+)
+from reachmap.cell.model.orientations import ConeFamily, OrientationFamily
+
+Count = Annotated[int, Field(ge=1, le=10000)]
+
+
+class CubeSpec(Record):
+    """A lattice of points: ``grid`` points along x and y, levels along z."""
+
+    name: str = Field(
+        pattern=r"^[A-Za-z_]\w*$", max_length=40, description="Name of its map."
+    )
+    min: Vector3 = Field(description="Lowest corner, robot_base [m].")
+    max: Vector3 = Field(description="Highest corner, robot_base [m].")
+    grid: tuple[Count, Count] = Field(description="Points along x and along y.")
+
+    @model_validator(mode="after")
+    def _corners_ordered(self) -> CubeSpec:
+        for axis, low, high in zip("xyz", self.min, self.max, strict=True):
+            if low > high:
+                raise ValueError(f"min.{axis} = {low} is above max.{axis} = {high}")
+        return self
+
+
+MAX_FRAMES = 50_000_000
+
+
+def _check_frame_count(count: int) -> None:
+    if count > MAX_FRAMES:
+        raise ValueError(
+            f"at most {MAX_FRAMES:,} test frames in a scan (got {count:,})"
+        )
+
+
+class WorkspaceScanSpec(Record):
+    """The workspace scan: cubes, levels, orientations, repeats."""
+
+    cubes: tuple[CubeSpec, ...] = Field(
+        min_length=1, max_length=16, description="Lattices that make up the map."
+    )
+    z_step: Length = Field(0.1, ge=1e-4, description="Distance between levels [m].")
+    orientations: OrientationFamily = Field(
+        ConeFamily(), description="Tool orientations tried at every point."
+    )
+    repeats: int = Field(
+        5, ge=1, le=255, description="Planning attempts to a frame or a component."
+    )
+
+    def count(self) -> int:
+        """Count the test frames of all cubes."""
+        points = 0
+        for cube in self.cubes:
+            levels = int((cube.max[2] - cube.min[2]) / self.z_step + 1e-9) + 1
+            points += cube.grid[0] * cube.grid[1] * levels
+        return points * self.orientations.count()
+
+    @model_validator(mode="after")
+    def _bounded(self) -> WorkspaceScanSpec:
+        names = [cube.name for cube in self.cubes]
+        if len(set(names)) < len(names):
+            raise ValueError(f"cubes need different names (got {', '.join(names)})")
+        _check_frame_count(self.count())
+        return self
+
+
+Height = Annotated[Coordinate, Field(ge=0)]
+
+
+class BinScanSpec(Record):
+    """The bin scan: test grasps inside the bin, and the pick they stand for."""
+
+    grid: tuple[Count, Count] = Field(
+        (20, 14), description="Points along the bin's x and y."
+    )
+    layers: tuple[Height, ...] = Field(
+        (0.05,),
+        min_length=1,
+        max_length=64,
+        description="Heights above the bottom [m].",
+    )
+    orientations: OrientationFamily = Field(
+        ConeFamily(), description="Tool orientations tried at every point."
+    )
+    repeats: int = Field(
+        5, ge=1, le=255, description="Planning attempts to each test grasp."
+    )
+    approach_distance_m: Height = Field(
+        0.0, description="Straight approach before the grasp [m]; 0 plans to the pose."
+    )
+
+    def count(self) -> int:
+        """Count the test grasps."""
+        points = self.grid[0] * self.grid[1] * len(self.layers)
+        return points * self.orientations.count()
+
+    @model_validator(mode="after")
+    def _layers_rise(self) -> BinScanSpec:
+        if list(self.layers) != sorted(set(self.layers)):
+            raise ValueError(f"layers must rise strictly (got {list(self.layers)})")
+        _check_frame_count(self.count() * self.repeats)
+        return self
+
+
+class PlacementSpec(Record):
+    """Where the bin may stand."""
+
+    x: LengthRange | None = Field(
+        None, description="Range of the bin's centre along robot_base x [m]."
+    )
+    y: LengthRange | None = Field(
+        None, description="Range of the bin's centre along robot_base y [m]."
+    )
+    z: LengthRange | None = Field(
+        None, description="Range of the bin's inner bottom along robot_base z [m]."
+    )
+    yaw_deg: AngleRange = Field(
+        (0.0, 180.0), description="Range of the bin's rotation about z [deg]."
+    )

@@ -1,0 +1,1 @@
+"""YAML with places: reading, writing, overriding, and messages that say where."""

@@ -1,0 +1,113 @@
+"""``--set key.path=value`` assignments, applied to the data of a cell file."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from pydantic import BaseModel
+
+from reachmap.cell.text.messages import did_you_mean, known_keys
+from reachmap.cell.text.yaml_reader import (
+    Document,
+    Location,
+    Mistake,
+    Place,
+    parse_yaml,
+)
+from reachmap.errors import CellError
+
+MAX_OVERRIDES = 1000
+
+
+def apply_overrides(
+    document: Document, overrides: Sequence[str], model: type[BaseModel]
+) -> None:
+    """Change ``document.data`` in place, one assignment after another.
+
+    A part of the path is a key, an index of a list, or the ``name`` of an entry of
+    a list (``bodies.gripper.pose.xyz.2=0.1``). Values are YAML. Mistakes are added
+    to the document.
+    """
+    if len(overrides) > MAX_OVERRIDES:
+        raise CellError(f"--set: at most {MAX_OVERRIDES} assignments")
+    for text in overrides:
+        place = Place(source=f"--set {text[:120]}")
+        try:
+            _apply(document, text, place, model)
+        except _PathError as error:
+            document.mistakes.append(Mistake(place=place, message=str(error)))
+        except CellError as error:
+            document.mistakes.extend(
+                Mistake(place=place, message=line.removeprefix(f"{place}:").strip())
+                for line in error.lines
+            )
+
+
+class _PathError(ValueError):
+    """The path of an assignment leads nowhere."""
+
+
+def _apply(document: Document, text: str, place: Place, model: type[BaseModel]) -> None:
+    path, separator, value_text = text.partition("=")
+    if not separator or not path.strip():
+        raise _PathError("expected key.path=value")
+    value = parse_yaml(value_text.strip() or "null", str(place))
+    parts = [part.strip() for part in path.strip().split(".")]
+    container, location = document.data, ()  # type: tuple[Any, Location]
+    for index, part in enumerate(parts):
+        key = _key(container, part, location, model)
+        last = index == len(parts) - 1
+        location = (*location, key)
+        if last:
+            container[key] = value.data
+        elif isinstance(container, dict) and container.get(str(key)) is None:
+            container[key] = {}
+            document.places[location] = place
+        container = container[key]
+    _replace_places(document, location, place)
+    for mistake in value.mistakes:
+        document.mistakes.append(
+            Mistake(
+                place=place,
+                location=(*location, *mistake.location),
+                message=mistake.message,
+            )
+        )
+
+
+def _key(
+    container: Any, part: str, location: Location, model: type[BaseModel]
+) -> str | int:
+    """Key or index that ``part`` means in a container; _PathError if it has none."""
+    where = ".".join(str(item) for item in location) or "the cell"
+    if isinstance(container, list):
+        if part.isascii() and part.isdigit() and len(part) < 9:
+            if int(part) < len(container):
+                return int(part)
+            raise _PathError(f"{where} has {len(container)} entries (got index {part})")
+        names = [item.get("name") for item in container if isinstance(item, dict)]
+        if part in names:
+            return next(
+                index
+                for index, item in enumerate(container)
+                if isinstance(item, dict) and item.get("name") == part
+            )
+        texts = [name for name in names if isinstance(name, str)]
+        hint = did_you_mean(part, texts)
+        raise _PathError(f"{where} has no entry {part!r}; {hint or 'use an index'}")
+    if not isinstance(container, dict):
+        raise _PathError(f"{where} is a single value (got .{part} after it)")
+    known = known_keys(model, location)
+    if known and part not in known:
+        raise _PathError(f"{where} has no key {part!r}; {did_you_mean(part, known)}")
+    return part
+
+
+def _replace_places(document: Document, location: Location, place: Place) -> None:
+    """Let the location and everything below it point at the assignment."""
+    for places in (document.places, document.key_places):
+        for inner in [key for key in places if key[: len(location)] == location]:
+            del places[inner]
+    document.places[location] = place
+    document.key_places[location] = place

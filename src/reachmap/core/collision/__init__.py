@@ -1,0 +1,1 @@
+"""Bodies and shapes, collision checks, displacement bounds, what the camera sees."""

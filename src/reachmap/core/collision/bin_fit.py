@@ -1,0 +1,240 @@
+"""Can a bin stand at a pose; which grasps do its walls deny to the tool itself."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import coal
+import numpy as np
+import pinocchio as pin
+
+from reachmap._typing import BoolArray, FloatArray
+from reachmap.core.collision.bodies import ROOT, BinBox, bin_boxes, build_geometry
+from reachmap.core.collision.static_bodies import (
+    PlacedBodies,
+    PlacedBody,
+    bodies_at,
+    box_around,
+)
+from reachmap.geometry import inverse_transform, transform_from_parts
+
+if TYPE_CHECKING:
+    from reachmap.cell.loading import LoadedCell
+    from reachmap.core.robot.model import RobotModel
+
+CONTACT_M = 2e-4
+WHOLE = "bin"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BinContact:
+    """What a bin meets.
+
+    Attributes
+    ----------
+    part : str
+        Part of the bin, ``bin wall +x`` for example, or ``bin`` for its inside.
+    other : str
+        Body or link.
+    at_scan : bool
+        Whether the arm carries the other, and is at the scan configuration.
+    """
+
+    part: str
+    other: str
+    at_scan: bool
+
+    @property
+    def reason(self) -> str:
+        """Why the bin cannot stand there; the same text for all its parts."""
+        where = " at the scan configuration" if self.at_scan else ""
+        return f"the bin meets {self.other}{where}"
+
+    @property
+    def pair(self) -> str:
+        """Both bodies, in words."""
+        where = " at the scan configuration" if self.at_scan else ""
+        return f"{self.part} touches {self.other}{where}"
+
+
+class BinFit:
+    """Checks poses of the bin against bodies that stand still and against the arm.
+
+    A body may touch the bin from outside, as a table does that carries it, but not
+    reach into it. The arm keeps the cell's safety margin, as in every plan.
+
+    Parameters
+    ----------
+    robot : RobotModel
+    loaded : LoadedCell
+        Its own bin pose is not used.
+    q : array, shape (dof,), or None
+        Scan configuration [rad]; None where it is not known yet, and the arm is left
+        out.
+    empty : bool
+        Whether what stands still may not be inside the bin either; a divider may,
+        as long as it does not reach into walls or bottom.
+    """
+
+    def __init__(
+        self,
+        robot: RobotModel,
+        loaded: LoadedCell,
+        q: FloatArray | None,
+        *,
+        empty: bool = True,
+    ) -> None:
+        geometry = build_geometry(robot, loaded, with_bin=False)
+        bodies = bodies_at(robot, geometry, np.zeros(robot.dof) if q is None else q)
+        boxes = bin_boxes(loaded.cell.bin)
+        # A little smaller, so that standing on a table is no collision.
+        still_parts = _parts(boxes, CONTACT_M)
+        if empty:
+            still_parts.append(_part(_solid(boxes), CONTACT_M))
+        still = PlacedBodies(b for b in bodies if b.joint == ROOT)
+        self._groups = [_Group(still, still_parts, loaded)]
+        if q is not None:
+            margin_m = loaded.cell.collision.safety_margin_m
+            arm = PlacedBodies((b for b in bodies if b.joint != ROOT), margin_m)
+            self._groups.append(_Group(arm, _parts(boxes, 0.0), loaded))
+
+    def contact(self, T_base_bin: FloatArray) -> BinContact | None:
+        """First thing that the bin meets at a pose (4, 4), or None."""
+        for group in self._groups:
+            pair = group.first_pair(T_base_bin)
+            if pair is not None:
+                part, body = pair
+                return BinContact(
+                    part=part, other=body.name, at_scan=body.joint != ROOT
+                )
+        return None
+
+
+class ToolFit:
+    """Checks what the arm's last joint carries against the bin, arm aside.
+
+    Parameters
+    ----------
+    robot : RobotModel
+    loaded : LoadedCell
+    """
+
+    def __init__(self, robot: RobotModel, loaded: LoadedCell) -> None:
+        q = np.zeros(robot.dof)
+        geometry = build_geometry(robot, loaded, with_bin=False)
+        bodies = bodies_at(robot, geometry, q)
+        T_tcp_base = inverse_transform(_tcp_pose(robot, q))
+        self._tool = [
+            PlacedBody(name=b.name, joint=b.joint, shape=b.shape, T=T_tcp_base @ b.T)
+            for b in bodies
+            if b.joint == robot.tcp_joint
+        ]
+        boxes = bin_boxes(loaded.cell.bin)
+        self._walls = PlacedBodies(
+            (
+                PlacedBody(name=box.name, joint=ROOT, shape=shape, T=_at(centre))
+                for box, (_, shape, centre) in zip(
+                    boxes, _parts(boxes, 0.0), strict=True
+                )
+            ),
+            loaded.cell.collision.safety_margin_m,
+        )
+        self._allowed = _Touches(loaded)
+
+    def blocked(self, T_bin_tcp: FloatArray) -> BoolArray:
+        """Whether the tool touches the bin, shape (n, 4, 4) to (n,)."""
+        blocked = np.zeros(len(T_bin_tcp), bool)
+        for body in self._tool:
+            T_bin_body = T_bin_tcp @ body.T
+            forbidden = np.array(
+                [not self._allowed(w.name, body.name) for w in self._walls.bodies]
+            )
+            near = self._walls.near_many(*box_around(body.shape, T_bin_body))
+            near &= forbidden
+            for row in np.flatnonzero(near.any(axis=1) & ~blocked):
+                among = np.flatnonzero(near[row]).tolist()
+                hit = self._walls.touching(body.shape, T_bin_body[row], among)
+                blocked[row] = hit >= 0
+        return blocked
+
+
+class _Touches:
+    """Which contacts with the bin the cell allows."""
+
+    def __init__(self, loaded: LoadedCell) -> None:
+        self._of_bin = set(loaded.cell.bin.touch)
+        self._of_body = {b.name: set(b.touch) for b in loaded.cell.bodies}
+
+    def __call__(self, part: str, other: str) -> bool:
+        return other in self._of_bin or bool(
+            self._of_body.get(other, set()) & {WHOLE, part}
+        )
+
+
+Part = tuple[str, Any, FloatArray]
+
+
+class _Group:
+    """Bodies with the shapes of the bin that must not touch them."""
+
+    def __init__(
+        self, placed: PlacedBodies, parts: list[Part], loaded: LoadedCell
+    ) -> None:
+        self._placed, self._parts = placed, parts
+        self._allowed = _Touches(loaded)
+        corners = np.array(
+            [
+                centre + sign * np.array(shape.halfSide)
+                for _, shape, centre in parts
+                for sign in (-1, 1)
+            ]
+        )
+        self._low, self._high = corners.min(axis=0), corners.max(axis=0)
+
+    def first_pair(self, T_base_bin: FloatArray) -> tuple[str, PlacedBody] | None:
+        """Part of the bin and the body it touches first, or None."""
+        R = T_base_bin[:3, :3]
+        centre = R @ ((self._low + self._high) / 2) + T_base_bin[:3, 3]
+        half = np.abs(R) @ ((self._high - self._low) / 2)
+        near = self._placed.near(centre - half, centre + half)
+        for name, shape, offset in self._parts:
+            among = [
+                k for k in near if not self._allowed(name, self._placed.bodies[k].name)
+            ]
+            hit = self._placed.touching(shape, T_base_bin @ _at(offset), among)
+            if hit >= 0:
+                return name, self._placed.bodies[hit]
+        return None
+
+
+def _parts(boxes: Iterable[BinBox], shrink_m: float) -> list[Part]:
+    return [_part(box, shrink_m) for box in boxes]
+
+
+def _part(box: BinBox, shrink_m: float) -> Part:
+    size = np.maximum(np.array(box.size_m) - shrink_m, 1e-6)
+    return box.name, coal.Box(*size), np.array(box.centre_m)
+
+
+def _solid(boxes: tuple[BinBox, ...]) -> BinBox:
+    """The box around all parts of a bin, its inside included."""
+    centres = np.array([box.centre_m for box in boxes])
+    halves = np.array([box.size_m for box in boxes]) / 2
+    low, high = (centres - halves).min(axis=0), (centres + halves).max(axis=0)
+    x, y, z = (high - low).tolist()
+    u, v, w = ((low + high) / 2).tolist()
+    return BinBox(name=WHOLE, size_m=(x, y, z), centre_m=(u, v, w))
+
+
+def _at(p: FloatArray) -> FloatArray:
+    return transform_from_parts(np.eye(3), p)
+
+
+def _tcp_pose(robot: RobotModel, q: FloatArray) -> FloatArray:
+    """T_base_tcp at q; the last joint carries the TCP."""
+    data = robot.model.createData()
+    pin.forwardKinematics(robot.model, data, q)
+    T_root_joint = data.oMi[robot.tcp_joint].homogeneous
+    return np.asarray(robot.T_base_root @ T_root_joint @ robot.T_joint_tcp)

@@ -1,0 +1,104 @@
+"""What a camera sees: does anything stand between it and what it looks at."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import coal
+import numpy as np
+
+from reachmap._typing import FloatArray
+from reachmap.core.collision.bodies import build_geometry
+from reachmap.core.collision.static_bodies import (
+    PlacedBodies,
+    PlacedBody,
+    bodies_at,
+    convex_hull,
+)
+from reachmap.geometry import inverse_transform, transform_from_parts
+
+if TYPE_CHECKING:
+    from reachmap.cell.loading import LoadedCell
+    from reachmap.core.robot.model import RobotModel
+
+LENS_RADIUS_M = 0.001
+
+
+class Camera:
+    """A cell's camera, and the bodies that may stand in its way.
+
+    Parameters
+    ----------
+    robot : RobotModel
+    loaded : LoadedCell
+        With a camera; its bin is among the bodies.
+
+    Attributes
+    ----------
+    is_carried : bool
+        Whether it moves with the TCP.
+    T_tcp_camera : array, shape (4, 4)
+        Optical frame in the TCP's, for a camera that is carried.
+    """
+
+    def __init__(self, robot: RobotModel, loaded: LoadedCell) -> None:
+        spec = loaded.cell.camera
+        if spec is None:
+            raise ValueError("this cell has no camera")
+        self._robot = robot
+        self._bodies = build_geometry(robot, loaded, with_bin=True)
+        self._joint, T_joint_frame = robot.frame_placement(spec.parent)
+        self._T_joint_camera = T_joint_frame @ spec.matrix()
+        self.is_carried = self._joint == robot.tcp_joint
+        self.T_tcp_camera = inverse_transform(robot.T_joint_tcp) @ self._T_joint_camera
+        self._around_lens = self._bodies_around_lens()
+
+    def hidden_by(
+        self, q: FloatArray, T_base_camera: FloatArray, corners: FloatArray
+    ) -> str:
+        """Name of a body that hides part of a convex volume, or "".
+
+        All lines of sight to the volume lie in the convex hull of its corners and
+        the lens, so one collision check answers for all of them. Bodies that the
+        lens itself is inside of, such as its housing, are taken to have a window.
+
+        Parameters
+        ----------
+        q : array, shape (dof,)
+        T_base_camera : array, shape (4, 4)
+            Of this configuration.
+        corners : array, shape (n, 3)
+            robot_base [m].
+        """
+        lens = T_base_camera[:3, 3]
+        cone = convex_hull(np.vstack([lens, corners]))
+        bodies = [
+            body
+            for index, body in enumerate(bodies_at(self._robot, self._bodies, q))
+            if index not in self._around_lens
+        ]
+        placed = PlacedBodies(bodies)
+        hit = placed.first_touched(cone, np.eye(4))
+        return placed.bodies[hit].name if hit >= 0 else ""
+
+    def _bodies_around_lens(self) -> set[int]:
+        lens = coal.Sphere(LENS_RADIUS_M)
+        found = set()
+        for index, body in enumerate(self._bodies.geometry.geometryObjects):
+            if int(body.parentJoint) != self._joint:
+                continue
+            T_body_camera = (
+                inverse_transform(np.array(body.placement.homogeneous))
+                @ self._T_joint_camera
+            )
+            place = transform_from_parts(np.eye(3), T_body_camera[:3, 3])
+            if _solid(body.geometry).first_touched(lens, place) >= 0:
+                found.add(index)
+        return found
+
+
+def _solid(shape: object) -> PlacedBodies:
+    """One body at the origin; a mesh, which is a surface, as its convex hull."""
+    if isinstance(shape, coal.BVHModelBase):
+        shape = convex_hull(np.asarray(shape.vertices(), float))
+    return PlacedBodies([PlacedBody(name="", joint=0, shape=shape, T=np.eye(4))])

@@ -1,0 +1,235 @@
+"""Is a configuration free; if not, which two bodies touch.
+
+The truth is coal on the collision meshes with a safety margin on every pair. Beside it
+stands a ladder of checks with wider and wider margins, on convex hulls: a configuration
+that is clear by a distance lets the robot move by that much without another check,
+which is how :mod:`reachmap.core.planning.motion` proves whole motions free.
+
+An answer depends on the question alone, to the last bit, and never on what was asked
+before; so units of work may be done in any order and process.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Collection, Mapping
+from typing import TYPE_CHECKING, Any
+
+import coal
+import numpy as np
+import pinocchio as pin
+
+from reachmap._typing import BoolArray, FloatArray
+from reachmap.core.collision.bodies import BodyGeometry
+from reachmap.core.collision.displacement import MotionBound, displacement_bounds
+from reachmap.core.collision.never_meet import joints_between, pairs_that_never_meet
+from reachmap.core.robot.chain import SerialChain
+
+if TYPE_CHECKING:
+    from reachmap.core.robot.model import RobotModel
+
+LADDER_M = (0.004, 0.008, 0.016, 0.032, 0.064)
+WIDEST_M = LADDER_M[-1]
+_NO_PAIR = -1
+
+
+class CollisionChecker:
+    """Collision checks of configurations.
+
+    Parameters
+    ----------
+    robot : RobotModel
+    bodies : BodyGeometry
+        Pairs that can never meet are removed from it.
+    safety_margin_m : float
+        Bodies closer than this count as touching.
+    movable : collection of str
+        Bodies that stand still and may be moved; nothing is proved about them.
+
+    Attributes
+    ----------
+    robot : RobotModel
+    body_pairs : tuple of str
+        ``"A | B"`` for each different pair of names that is checked.
+    proved_pairs : tuple of str
+        Pairs that were proved never to meet.
+    reach_m : array, shape (dof,)
+        No point of the robot moves further than ``reach_m @ |Δq|`` [m/rad].
+    bound : MotionBound
+        The tighter bound of a motion from where the robot is.
+    checks : int
+        Configurations checked so far, the unit in which budgets are counted.
+    """
+
+    def __init__(
+        self,
+        robot: RobotModel,
+        bodies: BodyGeometry,
+        safety_margin_m: float,
+        *,
+        movable: Collection[str] = (),
+    ) -> None:
+        self.robot = robot
+        self._model = robot.model
+        self._geometry = bodies.geometry
+        self._movable = {n: k for k, n in enumerate(bodies.names) if n in movable}
+        self.safety_margin_m = safety_margin_m
+        bounds = displacement_bounds(robot.model, bodies.geometry)
+        self._hulls = _with_convex_hulls(bodies.geometry)
+        proved = pairs_that_never_meet(
+            robot.model,
+            self._hulls,
+            bounds,
+            safety_margin_m,
+            left_out=frozenset(self._movable.values()),
+        )
+        for first, second in proved:
+            pair = pin.CollisionPair(first, second)
+            bodies.geometry.removeCollisionPair(pair)
+            self._hulls.removeCollisionPair(pair)
+        self.proved_pairs = tuple(
+            f"{bodies.names[a]} | {bodies.names[b]}" for a, b in proved
+        )
+        self._pair_names = bodies.pair_names()
+        self.body_pairs = tuple(dict.fromkeys(self._pair_names))
+        self._pair_index = np.array(
+            [self.body_pairs.index(name) for name in self._pair_names], dtype=np.int64
+        )
+        self.reach_m = np.maximum(bounds.max(axis=0, initial=0.0), 1e-9)
+        self.bound = MotionBound(
+            SerialChain.from_robot(robot), robot.model, bodies.geometry, self.reach_m
+        )
+        self._shares = _margin_shares(bodies.geometry, bounds, self.reach_m)
+        self.checks = 0
+        self._start_engine()
+
+    def _start_engine(self) -> None:
+        self._data = self._model.createData()
+        self._broadphase, self._base = self._broadphase_with(
+            self._geometry, np.full(len(self._pair_names), self.safety_margin_m)
+        )
+        self._ladder = [
+            (
+                step,
+                *self._broadphase_with(
+                    self._hulls, self.safety_margin_m + step * self._shares
+                ),
+            )
+            for step in LADDER_M
+        ]
+
+    def move(self, T_root_body: Mapping[str, FloatArray]) -> None:
+        """Put movable bodies elsewhere, by name and pose (4, 4)."""
+        for name, T in T_root_body.items():
+            placement = pin.SE3(np.ascontiguousarray(T))
+            for geometry in (self._geometry, self._hulls):
+                geometry.geometryObjects[self._movable[name]].placement = placement
+        self._start_engine()
+
+    def _broadphase_with(self, geometry: Any, margins: FloatArray) -> tuple[Any, Any]:
+        data = geometry.createData()
+        for request, margin in zip(data.collisionRequests, margins, strict=True):
+            request.security_margin = float(margin)
+        _guess_nothing(data.collisionRequests)
+        # The naive manager is the fastest on a cell; the sweep-and-prune one misses
+        # collisions (reference: 75 of 10,500).
+        manager = pin.BroadPhaseManager_NaiveCollisionManager(
+            self._model, geometry, data
+        )
+        return manager, data
+
+    def is_free(self, q: FloatArray) -> bool:
+        """Whether all pairs are further apart than the safety margin."""
+        self.checks += 1
+        return not pin.computeCollisions(
+            self._model, self._data, self._broadphase, q, True
+        )
+
+    def is_clear(self, q: FloatArray, distance_m: float) -> bool:
+        """Whether the robot may move by a distance from q, whichever way.
+
+        True is a proof: no motion in which no point moves further than ``distance_m``
+        brings a pair closer than the safety margin. False says nothing; the answer is
+        conservative, as it uses convex hulls and the next wider step of the ladder.
+        """
+        for step, manager, _ in self._ladder:
+            if step >= distance_m:
+                self.checks += 1
+                return not pin.computeCollisions(
+                    self._model, self._data, manager, q, True
+                )
+        return False
+
+    def free_mask(self, Q: FloatArray) -> BoolArray:
+        """:meth:`is_free` of many configurations, shape (n, dof) to (n,)."""
+        return np.array([self.is_free(q) for q in Q], dtype=bool)
+
+    def touching_pairs(self, q: FloatArray) -> tuple[int, ...]:
+        """Indices into ``body_pairs`` of all pairs that touch at q."""
+        data = self._base
+        pin.computeCollisions(self._model, self._data, self._geometry, data, q, False)
+        hits = [
+            int(self._pair_index[index])
+            for index, result in enumerate(data.collisionResults)
+            if result.isCollision()
+        ]
+        return tuple(dict.fromkeys(hits))
+
+    def blocking_pair(self, q: FloatArray) -> int:
+        """Index into ``body_pairs`` of a pair that touches at q, or -1."""
+        pairs = self.touching_pairs(q)
+        return pairs[0] if pairs else _NO_PAIR
+
+    def blocking_pair_of_many(self, Q: FloatArray) -> int:
+        """The pair to blame when every configuration of a set collides.
+
+        That is the pair of the configuration with the fewest pairs in collision:
+        the one nearest to being free.
+        """
+        candidates = [pairs for q in Q if (pairs := self.touching_pairs(q))]
+        return min(candidates, key=len)[0] if candidates else _NO_PAIR
+
+
+def _guess_nothing(requests: Any) -> None:
+    """Let checks begin from nothing that an earlier one has left.
+
+    Its guess would change answers in the last digits, and saves no time that could be
+    measured.
+    """
+    with warnings.catch_warnings():
+        # The setting that coal has in its place acts beside this one, not instead.
+        warnings.simplefilter("ignore", DeprecationWarning)
+        for request in requests:
+            request.enable_cached_gjk_guess = False
+
+
+def _margin_shares(
+    geometry: Any, bounds: FloatArray, reach_m: FloatArray
+) -> FloatArray:
+    """Share of the robot's displacement that can bring each pair together.
+
+    A motion that moves no point further than d moves the outer body of a pair
+    against the inner one by at most ``d · max_j R[outer, j] / reach_j`` over the joints
+    between them; two neighbours at the wrist need not keep the distance that the
+    camera needs from the floor.
+    """
+    shares = []
+    for pair in geometry.collisionPairs:
+        joints, outer = joints_between(geometry, pair)
+        between = list(joints)
+        shares.append(float((bounds[outer, between] / reach_m[between]).max()))
+    return np.array(shares)
+
+
+def _with_convex_hulls(geometry: Any) -> Any:
+    """Copy of a geometry model with convex hulls in place of meshes."""
+    copy = geometry.copy()
+    for body in copy.geometryObjects:
+        if isinstance(body.geometry, coal.BVHModelBase):
+            points = coal.StdVec_Vec3s()
+            points.extend(list(np.asarray(body.geometry.vertices(), float)))
+            try:
+                body.geometry = coal.Convex.convexHull(points, True, "Qt")
+            except Exception:  # a flat mesh has no hull; it stays a mesh
+                continue
+    return copy

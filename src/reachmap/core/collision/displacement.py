@@ -1,0 +1,206 @@
+"""How far a point of the robot can move when the joints move.
+
+A change Δq moves no point of body g further than ``Σ_j R[g, j] |Δq_j|``, where
+``R[g, j]`` bounds the distance of the body's points from the axis of joint j over all
+configurations (for a prismatic joint it is 1). The bound follows the chain outwards
+in: a point within ρ of the origin of joint j+1 is within ``‖p‖ + ρ`` of the origin of
+joint j; where the two axes are parallel, only distances across the axes add up.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import coal
+import numpy as np
+
+from reachmap._typing import FloatArray
+
+if TYPE_CHECKING:
+    from reachmap.core.robot.chain import SerialChain
+
+_SIGNS: FloatArray = (
+    np.array(np.meshgrid([-1.0, 1.0], [-1.0, 1.0], [-1.0, 1.0])).reshape(3, -1).T
+)
+
+
+def displacement_bounds(model: Any, geometry: Any) -> FloatArray:
+    """Bounds R of all bodies and joints, shape (bodies, dof), [m/rad] or [m/m].
+
+    Parameters
+    ----------
+    model : pinocchio.Model
+        A chain: the parent of joint j is joint j − 1.
+    geometry : pinocchio.GeometryModel
+    """
+    axes = [_axis(model, joint) for joint in range(1, model.njoints)]
+    bounds = np.zeros((geometry.ngeoms, model.nv))
+    for row, body in zip(bounds, geometry.geometryObjects, strict=True):
+        if body.parentJoint == 0:
+            continue
+        points = _corner_points(body.geometry)
+        points = points @ body.placement.rotation.T + body.placement.translation
+        _fill_row(row, model, axes, body.parentJoint, points)
+    return bounds
+
+
+class MotionBound:
+    """Displacement along short straight motions, from where the robot really is.
+
+    The bounds R hold for the stretched-out arm. For a motion q ± sΔ, 0 ≤ s ≤ 1, a
+    point X moves no further than ``‖J_X(q) Δ‖ + ½ (Σ|Δ_i|)(Σ R_j |Δ_j|)``: Taylor, with
+    the second term over revolute joints i. The first is largest at a corner of the
+    hull of the bodies, since it is convex in X.
+
+    Parameters
+    ----------
+    chain : SerialChain
+    model : pinocchio.Model
+    geometry : pinocchio.GeometryModel
+    reach_m : array, shape (dof,)
+        Largest R of each joint.
+    """
+
+    def __init__(
+        self, chain: SerialChain, model: Any, geometry: Any, reach_m: FloatArray
+    ) -> None:
+        self._chain = chain
+        self._reach_m = reach_m
+        self._corners = _corners_by_joint(chain, model, geometry)
+
+    def displacement_m(self, Q: FloatArray, half_change: FloatArray) -> FloatArray:
+        """Bound for motions ``Q[k] ± half_change``, any part of them included.
+
+        Parameters
+        ----------
+        Q : array, shape (n, dof)
+        half_change : array, shape (dof,)
+
+        Returns
+        -------
+        array, shape (n,)
+            For the part of relative size f of the motion, f times this holds about
+            the part's own middle.
+        """
+        frames = self._chain.joint_frames_many(Q)
+        origin, axis = frames[..., :3, 3], frames[..., :3, 2]
+        turning = axis * np.where(self._chain.is_revolute, half_change, 0.0)[:, None]
+        sliding = axis * np.where(self._chain.is_revolute, 0.0, half_change)[:, None]
+        # Velocity of a point X on joint k: Σ_{j ≤ k} (a_j × (X − o_j)) Δ_j.
+        angular = np.cumsum(turning, axis=1)
+        linear = np.cumsum(sliding + _cross(origin, turning), axis=1)
+        corners = frames[..., :3, :3] @ self._corners + origin[..., None]
+        # Coordinates first, and no np.cross: this is called for every motion.
+        ux, uy, uz = (linear[:, :, k, None] for k in range(3))
+        wx, wy, wz = (angular[:, :, k, None] for k in range(3))
+        x, y, z = corners[:, :, 0], corners[:, :, 1], corners[:, :, 2]
+        square = (ux + wy * z - wz * y) ** 2
+        square += (uy + wz * x - wx * z) ** 2
+        square += (uz + wx * y - wy * x) ** 2
+        first = np.sqrt(square.max(axis=(1, 2)))
+        size = np.abs(half_change)
+        second = size[self._chain.is_revolute].sum() * float(size @ self._reach_m)
+        return np.asarray(first + second)
+
+
+def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Cross products along the last axis, for small arrays faster than numpy's."""
+    ax, ay, az = a[..., 0], a[..., 1], a[..., 2]
+    bx, by, bz = b[..., 0], b[..., 1], b[..., 2]
+    c = np.empty(a.shape)
+    c[..., 0] = ay * bz - az * by
+    c[..., 1] = az * bx - ax * bz
+    c[..., 2] = ax * by - ay * bx
+    return c
+
+
+def _corners_by_joint(chain: SerialChain, model: Any, geometry: Any) -> FloatArray:
+    """Corners of a box around all bodies of each joint, shape (dof, 3, 8).
+
+    In the chain's joint frames, whose z is the joint axis.
+    """
+    frames = chain.joint_rotations(model)
+    corners = np.zeros((chain.dof, 3, len(_SIGNS)))
+    for k in range(chain.dof):
+        points = [
+            (
+                _corner_points(body.geometry) @ body.placement.rotation.T
+                + body.placement.translation
+            )
+            @ frames[k]
+            for body in geometry.geometryObjects
+            if body.parentJoint == k + 1
+        ]
+        if points:
+            cloud = np.vstack(points)
+            low, high = cloud.min(axis=0), cloud.max(axis=0)
+            corners[k] = ((low + high) / 2 + _SIGNS * (high - low) / 2).T
+    return corners
+
+
+def _fill_row(
+    row: FloatArray,
+    model: Any,
+    axes: list[tuple[FloatArray, bool]],
+    joint: int,
+    points: FloatArray,
+) -> None:
+    """Walk from the body's own joint to the root, outermost bound first."""
+    axis, turns = axes[joint - 1]
+    across = float(_across(points, axis).max())
+    around = float(np.linalg.norm(points, axis=1).max())
+    row[joint - 1] = across if turns else 1.0
+    while (parent := model.parents[joint]) > 0:
+        offset = model.jointPlacements[joint]
+        axis, turns = axes[joint - 1]
+        travel = 0.0 if turns else _largest_travel(model, joint)
+        parent_axis, parent_turns = axes[parent - 1]
+        here = offset.rotation @ axis
+        parallel = turns and np.linalg.norm(np.cross(here, parent_axis)) < 1e-9
+        step = float(_across(offset.translation[None], parent_axis)[0])
+        around = float(np.linalg.norm(offset.translation)) + travel + around
+        across = min(around, step + across) if parallel else around
+        row[parent - 1] = across if parent_turns else 1.0
+        joint = parent
+
+
+def _axis(model: Any, joint: int) -> tuple[FloatArray, bool]:
+    """Unit axis in the joint frame, and whether the joint turns about it."""
+    data = model.joints[joint].createData()
+    model.joints[joint].calc(data, np.zeros(model.nq))
+    motion = np.asarray(data.S).reshape(6, -1)[:, 0]
+    turns = bool(np.linalg.norm(motion[3:]) > 0.5)
+    return (motion[3:] if turns else motion[:3]), turns
+
+
+def _across(points: FloatArray, axis: FloatArray) -> FloatArray:
+    """Distance of points from the line through the origin along a unit axis."""
+    along = points @ axis
+    return np.asarray(np.linalg.norm(points - np.outer(along, axis), axis=1))
+
+
+def _largest_travel(model: Any, joint: int) -> float:
+    index = model.idx_qs[joint]
+    low, high = model.lowerPositionLimit[index], model.upperPositionLimit[index]
+    return float(max(abs(low), abs(high)))
+
+
+def _corner_points(shape: Any) -> FloatArray:
+    """Points whose convex hull holds the shape, shape (n, 3)."""
+    if isinstance(shape, coal.BVHModelBase):
+        return np.asarray(shape.vertices(), float).reshape(-1, 3)
+    if isinstance(shape, coal.Box):
+        half = np.asarray(shape.halfSide, float)
+    elif isinstance(shape, coal.Sphere):
+        half = np.full(3, float(shape.radius))
+    elif isinstance(shape, coal.Capsule):
+        half = np.array([shape.radius, shape.radius, shape.halfLength + shape.radius])
+    elif isinstance(shape, coal.Cylinder):
+        half = np.array([shape.radius, shape.radius, shape.halfLength])
+    else:
+        box = shape.aabb_local
+        shape.computeLocalAABB()
+        low, high = np.asarray(box.min_), np.asarray(box.max_)
+        centre, half = (low + high) / 2, (high - low) / 2
+        return np.asarray(centre + _SIGNS * half)
+    return np.asarray(_SIGNS * half)

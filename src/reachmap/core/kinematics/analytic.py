@@ -1,0 +1,246 @@
+"""Closed-form inverse kinematics by EAIK, with what EAIK leaves to its caller.
+
+EAIK finds all branches of six-axis arms of known structure in microseconds. Left to
+the caller are: rows that do not meet the pose, singular poses (branches are missing
+there, and its least-squares flag is no guide), joint limits and whole turns.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from eaik.pybindings import EAIK
+
+from reachmap._typing import BoolArray, FloatArray, IntArray
+from reachmap.core.kinematics.numeric import ACCEPTED, matrix_difference, refine_many
+from reachmap.core.kinematics.solutions import Rows, angular_distance, distinct, joined
+from reachmap.core.robot.chain import SerialChain
+from reachmap.geometry import transform_from_parts
+
+# EAIK's solutions miss by 1e-12; a row that misses by less than _NEAR is worth
+# polishing [m and rad].
+MET = 1e-9
+_NEAR = 1e-3
+
+# Poses are turned aside by this angle [rad]: enough for EAIK to be regular again.
+_ASIDE_RAD = 1e-5
+
+# Regular rows move by 1e-5 rad when the pose is turned aside, and by its square root
+# at the edge of reach; at a singularity they jump.
+_JUMP_RAD = 0.1
+
+# A pose with so many solutions has all its branches.
+_ALL_BRANCHES = 8
+
+# Frames per block, which bounds the memory of the pairwise comparison.
+_BLOCK = 2048
+
+
+def _turned(axis: tuple[float, float, float]) -> FloatArray:
+    """Small rotation about an axis of the TCP, shape (4, 4)."""
+    x, y, z = np.array(axis) * _ASIDE_RAD
+    # Of first order, then made orthonormal: exact to 1e-10, more than it needs.
+    R, _ = np.linalg.qr(np.array([[1, -z, y], [z, 1, -x], [-y, x, 1]]))
+    return transform_from_parts(R * np.sign(np.diag(R)), np.zeros(3))
+
+
+_ASIDE = _turned((0.48, 0.60, 0.64))
+
+# At a wrist singularity the direction decides which points of the curve are found.
+_ASIDE_FOUR_WAYS = tuple(
+    _turned(axis) for axis in ((1, 0, 0), (0, 1, 0), (-1, 0, 0), (0, -1, 0))
+)
+
+
+class EaikRows:
+    """EAIK's raw rows for many poses.
+
+    Parameters
+    ----------
+    chain : SerialChain
+        Revolute joints only.
+    fixed : sequence of (int, float), optional
+        Joints held at a value, by index.
+    """
+
+    def __init__(
+        self, chain: SerialChain, fixed: Sequence[tuple[int, float]] = ()
+    ) -> None:
+        self._robot = EAIK.Robot(
+            chain.axes_base,
+            chain.offsets_base,
+            chain.R_base_tcp_zero,
+            [(int(joint), float(value)) for joint, value in fixed],
+            True,
+        )
+        self._dof = chain.dof
+
+    def __call__(self, T: FloatArray) -> Rows:
+        """Rows of all poses, least-squares ones included, (n, 4, 4) to a table."""
+        solve = self._robot.calculate_IK
+        found = [solve(pose).Q for pose in T]
+        counts = [len(rows) for rows in found]
+        frame = np.repeat(np.arange(len(T)), counts)
+        # Without solutions EAIK's array may lack columns as well as rows.
+        some = [rows for rows in found if len(rows)]
+        Q = np.concatenate([np.zeros((0, self._dof)), *some])
+        finite = np.isfinite(Q).all(axis=1)
+        return Q[finite], frame[finite]
+
+    @property
+    def family(self) -> str:
+        """EAIK's name of the structure."""
+        return str(self._robot.get_kinematic_family())
+
+    @property
+    def is_known(self) -> bool:
+        """Whether EAIK has a decomposition for the structure."""
+        # For five axes the flag is true even when the family is unknown.
+        known = bool(self._robot.has_known_decomposition())
+        return known and "Unknown" not in self.family
+
+
+def can_use_eaik(
+    chain: SerialChain,
+    fixed: Sequence[tuple[int, float]] = (),
+    *,
+    within_rad: float = 1e-6,
+) -> bool:
+    """Whether EAIK solves this arm: known structure, and it passes a self-test.
+
+    In the self-test EAIK finds random configurations within `within_rad`.
+    The rank is tested before EAIK sees the arm: four parallel axes, for example,
+    end the process with a segmentation fault.
+    """
+    held = [joint for joint, _ in fixed]
+    free = [k for k in range(chain.dof) if k not in held]
+    if not chain.is_revolute.all() or len(free) > 6:
+        return False
+    rng = np.random.default_rng(0)
+    Q = rng.uniform(-np.pi, np.pi, (12, chain.dof))
+    for joint, value in fixed:
+        Q[:, joint] = value
+    T, J = chain.jacobian_many(Q)
+    ranks = np.linalg.matrix_rank(J[:, :, free], tol=1e-9)
+    if ranks.max() < len(free):
+        return False
+    rows = EaikRows(chain, fixed)
+    if not rows.is_known:
+        return False
+    Q_found, frame = rows(T)
+    differs = angular_distance(Q_found - Q[frame], chain.is_revolute).max(axis=1)
+    return bool(np.isin(np.arange(len(Q)), frame[differs < within_rad]).all())
+
+
+class AnalyticSolver:
+    """All branches of an arm that EAIK knows."""
+
+    method = "analytic"
+    complete = True
+
+    def __init__(self, chain: SerialChain) -> None:
+        self._chain = chain
+        self._rows = EaikRows(chain)
+
+    def branches(self, T: FloatArray) -> Rows:
+        """Solutions that meet their poses, without limits and turns.
+
+        At a wrist singularity the solutions of a pose form curves; points of them
+        are returned, the same in each run.
+
+        Parameters
+        ----------
+        T : array, shape (n, 4, 4)
+            Poses T_base_tcp.
+        """
+        tables = []
+        for start in range(0, len(T), _BLOCK):
+            Q, frame = self._block(T[start : start + _BLOCK])
+            tables.append((Q, frame + start))
+        return joined(tables, self._chain.dof)
+
+    def _block(self, T: FloatArray) -> Rows:
+        raw = self._rows(T)
+        rows = self._meeting(raw, T)
+        counts = np.bincount(rows[1], minlength=len(T))
+        doubtful = np.flatnonzero(counts < _ALL_BRANCHES)
+        if not len(doubtful):
+            return rows
+        singular = doubtful[self._jumps(raw, T, doubtful)]
+        if not len(singular):
+            return rows
+        more = [self._from_aside(T, singular, turn) for turn in _ASIDE_FOUR_WAYS]
+        all_rows = joined([rows, *more], self._chain.dof)
+        return distinct(all_rows, self._chain.is_revolute)
+
+    def _meeting(self, raw: Rows, T: FloatArray) -> Rows:
+        """Distinct rows that meet their pose, those that nearly do polished."""
+        Q, frame = raw
+        residual = matrix_difference(T[frame], self._chain.forward_many(Q))
+        met = residual <= MET
+        near = ~met & (residual <= _NEAR)
+        if not near.any():
+            return distinct((Q[met], frame[met]), self._chain.is_revolute)
+        Q_near, missed = refine_many(
+            self._chain,
+            Q[near],
+            T[frame[near]],
+            tolerance=1e-13,
+            iterations=30,
+            singular=True,
+        )
+        good = missed <= ACCEPTED
+        polished = (Q_near[good], frame[near][good])
+        rows = joined([(Q[met], frame[met]), polished], self._chain.dof)
+        return distinct(rows, self._chain.is_revolute)
+
+    def _jumps(self, raw: Rows, T: FloatArray, frames: IntArray) -> BoolArray:
+        """Whether the rows of a pose jump when the pose is turned aside.
+
+        Counting rows is not enough: where the arm is nearly stretched as well, rows
+        that stand for a missing branch are least-squares rows on both sides.
+        """
+        aside = self._rows(T[frames] @ _ASIDE)
+        position = np.full(len(T), -1)
+        position[frames] = np.arange(len(frames))
+        of_interest = position[raw[1]] >= 0
+        here = (raw[0][of_interest], position[raw[1][of_interest]])
+        return _differ(
+            _padded(here, len(frames)),
+            _padded(aside, len(frames)),
+            self._chain.is_revolute,
+        )
+
+    def _from_aside(self, T: FloatArray, frames: IntArray, turn: FloatArray) -> Rows:
+        """Solve poses turned aside, and come back to the poses themselves."""
+        Q, index = self._rows(T[frames] @ turn)
+        frame = frames[index]
+        Q, residual = refine_many(
+            self._chain, Q, T[frame], tolerance=1e-13, iterations=30, singular=True
+        )
+        good = residual <= ACCEPTED
+        return Q[good], frame[good]
+
+
+def _differ(a: FloatArray, b: FloatArray, is_revolute: BoolArray) -> BoolArray:
+    """Whether a frame has a row in one table without a near one in the other."""
+    distance = np.zeros((len(a), a.shape[1], b.shape[1]))
+    for k, turns in enumerate(is_revolute):
+        difference = a[:, :, None, k] - b[:, None, :, k]
+        np.maximum(distance, angular_distance(difference, turns), out=distance)
+    # A comparison with padding is NaN, hence not near.
+    near = distance <= _JUMP_RAD
+    alone_a = ~near.any(axis=2) & ~np.isnan(a[:, :, 0])
+    alone_b = ~near.any(axis=1) & ~np.isnan(b[:, :, 0])
+    return np.asarray(alone_a.any(axis=1) | alone_b.any(axis=1))
+
+
+def _padded(rows: Rows, n: int) -> FloatArray:
+    """Rows of n frames side by side, padded with NaN, shape (n, most rows, dof)."""
+    Q, frame = rows
+    counts = np.bincount(frame, minlength=n)
+    table = np.full((n, counts.max(initial=0), Q.shape[1]), np.nan)
+    slot = np.arange(len(Q)) - np.repeat(np.cumsum(counts) - counts, counts)
+    table[frame, slot] = Q
+    return table

@@ -1,0 +1,1 @@
+"""Motions, planners, paths, their times, and the roadmap that joins them."""

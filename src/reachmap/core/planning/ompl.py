@@ -1,0 +1,240 @@
+"""Searches with a planner of OMPL; the only module that knows OMPL."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+from ompl import base as ob
+from ompl import geometric as og
+from ompl import util as ou
+
+from reachmap._typing import FloatArray
+from reachmap.cell.model.planner import PlannerSpec
+from reachmap.core.collision.checker import CollisionChecker
+from reachmap.core.planning.motion import MotionChecker
+from reachmap.errors import EngineError
+
+_CLOCK_EVERY = 64
+# A planner asks once per iteration whether to go on. Some iterations check nothing;
+# a planner that only makes such iterations is to end by a count as well.
+_CALLS_PER_CHECK = 20
+
+
+class Budget:
+    """State checks left for searching; shortening does not count.
+
+    Parameters
+    ----------
+    checker : CollisionChecker
+        Counts the checks.
+    checks : int
+    seconds : float
+        Wall-clock time after which the attempt ends in any case.
+    """
+
+    def __init__(self, checker: CollisionChecker, checks: int, seconds: float) -> None:
+        self.checks = checks
+        self._checker = checker
+        self._limit = checker.checks + checks
+        self._search_limit = self._limit
+        self._begin = checker.checks
+        self._deadline = time.monotonic() + seconds
+        self._calls = 0
+        self._most_calls = _CALLS_PER_CHECK * checks
+        self._most_search_calls = self._most_calls
+        self.search_interrupted = False
+        self.out_of_time = False
+
+    def used(self) -> int:
+        """State checks spent on searching."""
+        return self._checker.checks - self._begin
+
+    def spent(self) -> bool:
+        """Whether the checks, or the seconds of the safety net, are used up."""
+        self._calls += 1
+        if self._checker.checks >= self._limit or self._calls >= self._most_calls:
+            return True
+        if self._calls % _CLOCK_EVERY == 0 and time.monotonic() > self._deadline:
+            self.out_of_time = True
+        return self.out_of_time
+
+    def begin_search(self, checks: int) -> None:
+        """Allow the search that begins so many checks of those that are left."""
+        self._search_limit = self._checker.checks + checks
+        self._most_search_calls = self._calls + _CALLS_PER_CHECK * checks
+        self.search_interrupted = False
+
+    def search_ends(self) -> bool:
+        """Whether the search has to end: the budget is spent, or its part of it."""
+        if self.spent():
+            return True
+        self.search_interrupted = (
+            self._checker.checks >= self._search_limit
+            or self._calls >= self._most_search_calls
+        )
+        return self.search_interrupted
+
+    @contextmanager
+    def paused(self) -> Iterator[None]:
+        """Context in which checks are not counted."""
+        used = self.used()
+        yield
+        unpaid = self.used() - used
+        self._limit += unpaid
+        self._begin += unpaid
+
+
+ou.setLogLevel(ou.LogLevel.LOG_NONE)
+
+_OPTIMISING = frozenset(
+    {"RRTstar", "BITstar", "InformedRRTstar", "SORRTstar", "AORRTC"}
+)
+# Their samples are drawn beforehand: begun anew they would have to be connected again.
+_BATCH = frozenset({"FMT", "BFMT"})
+
+
+class FoundPath:
+    """A path as OMPL found it, with the space it lives in."""
+
+    def __init__(self, information: Any, path: Any, dof: int) -> None:
+        self._information, self._path, self._dof = information, path, dof
+
+    def waypoints(self) -> FloatArray:
+        """Way-points, shape (n, dof)."""
+        states = (self._path.getState(row) for row in range(self._path.getStateCount()))
+        return np.array([[state[i] for i in range(self._dof)] for state in states])
+
+    def simplified(self) -> FloatArray:
+        """Way-points after OMPL's own ``simplifyMax``."""
+        og.PathSimplifier(self._information).simplifyMax(self._path)
+        return self.waypoints()
+
+
+class OmplSearch:
+    """A planner of the cell's kind, made anew for each search.
+
+    Parameters
+    ----------
+    motions : MotionChecker
+    spec : PlannerSpec
+    """
+
+    def __init__(self, motions: MotionChecker, spec: PlannerSpec) -> None:
+        self._motions, self._spec = motions, spec
+
+    @property
+    def may_begin_anew(self) -> bool:
+        """Whether a search that is cut short has lost little."""
+        return self._spec.name not in _OPTIMISING | _BATCH
+
+    def search(
+        self,
+        start: FloatArray,
+        goals: FloatArray,
+        seed: np.random.SeedSequence,
+        budget: Budget,
+    ) -> FoundPath | None:
+        """Run the planner once; None without an exact solution.
+
+        Parameters
+        ----------
+        start : array, shape (dof,)
+        goals : array, shape (m, dof)
+            Within the limits.
+        seed : SeedSequence
+            Of this search.
+        budget : Budget
+            Says when to give up.
+        """
+        # The seed is global in OMPL, and acts on what is built after it.
+        ou.RNG.setSeed(int(seed.generate_state(1)[0]) or 1)
+        space = self._space()
+        information = ob.SpaceInformation(space)
+        checker, dof = self._motions.checker, range(len(start))
+        information.setStateValidityChecker(
+            lambda state: checker.is_free(np.array([state[i] for i in dof]))
+        )
+        information.setMotionValidator(_MotionValidator(information, self._motions))
+        information.setup()
+        problem = ob.ProblemDefinition(information)
+        problem.addStartState(_state(information, start))
+        goal = ob.GoalStates(information)
+        for q in goals:
+            goal.addState(_state(information, q))
+        problem.setGoal(goal)
+        if self._spec.name in _OPTIMISING:
+            problem.setOptimizationObjective(
+                ob.PathLengthOptimizationObjective(information)
+            )
+        planner = self._planner(information)
+        planner.setProblemDefinition(problem)
+        planner.setup()
+        planner.solve(ob.PlannerTerminationCondition(budget.search_ends))
+        if not problem.hasExactSolution():
+            return None
+        return FoundPath(information, problem.getSolutionPath(), len(start))
+
+    def _space(self) -> Any:
+        robot = self._motions.checker.robot
+        space = ob.RealVectorStateSpace(robot.dof)
+        bounds = ob.RealVectorBounds(robot.dof)
+        limits = zip(robot.lower_rad, robot.upper_rad, strict=True)
+        for index, (low, high) in enumerate(limits):
+            bounds.setLow(index, float(low))
+            bounds.setHigh(index, float(high))
+        space.setBounds(bounds)
+        return space
+
+    def _planner(self, information: Any) -> Any:
+        try:
+            planner = getattr(og, self._spec.name)(information)
+        except AttributeError as error:
+            raise EngineError(f"OMPL has no planner {self._spec.name}") from error
+        if self._spec.range_rad is not None and hasattr(planner, "setRange"):
+            planner.setRange(self._spec.range_rad)
+        if self._spec.goal_bias is not None and hasattr(planner, "setGoalBias"):
+            planner.setGoalBias(self._spec.goal_bias)
+        if self._spec.projection_cell_rad and hasattr(
+            planner, "setProjectionEvaluator"
+        ):
+            planner.setProjectionEvaluator(
+                self._projection(information, self._spec.projection_cell_rad)
+            )
+        return planner
+
+    def _projection(self, information: Any, cell_rad: float) -> Any:
+        """Coarse cells over the two joints that move the tool furthest.
+
+        A random projection, as OMPL would take, costs three times the checks, and
+        their number depends on luck rather than on the way to the goal.
+        """
+        joints = np.sort(np.argsort(-self._motions.checker.reach_m, kind="stable")[:2])
+        return ob.RealVectorOrthogonalProjectionEvaluator(
+            information.getStateSpace(), [cell_rad] * len(joints), joints.tolist()
+        )
+
+
+class _MotionValidator(ob.MotionValidator):  # type: ignore[misc]
+    """Our definition of a free motion, given to OMPL."""
+
+    def __init__(self, information: Any, motions: MotionChecker) -> None:
+        super().__init__(information)
+        self._is_free = motions.is_free
+        self._dof = range(information.getStateDimension())
+
+    def checkMotion(self, first: Any, second: Any, *_: Any) -> bool:  # noqa: N802
+        return self._is_free(
+            np.array([first[i] for i in self._dof]),
+            np.array([second[i] for i in self._dof]),
+        )
+
+
+def _state(information: Any, q: FloatArray) -> Any:
+    state = information.allocState()
+    for index, value in enumerate(q):
+        state[index] = float(value)
+    return state

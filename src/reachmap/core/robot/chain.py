@@ -1,0 +1,199 @@
+"""A serial chain as arrays: forward kinematics and Jacobians of many configurations.
+
+Pinocchio works on one configuration at a time; inverse kinematics has to check
+hundreds of thousands. A configuration's result does not depend, to the last bit, on
+its neighbours in the batch (stacks of small matrices are multiplied one by one, never
+as one large product), so results are the same for every division of work.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from reachmap._typing import BoolArray, FloatArray
+from reachmap.core.robot.assembly import TCP_FRAME
+from reachmap.core.robot.model import RobotModel
+from reachmap.geometry import inverse_transform, transform_from_parts
+
+# Rows per block: the block's arrays, half a megabyte, stay in the cache.
+_BLOCK = 256
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class SerialChain:
+    """Joints about (or along) their own z axis, with fixed transforms between.
+
+    Attributes
+    ----------
+    T_fixed : array, shape (dof + 1, 4, 4)
+        From each joint's frame to the next one's at zero [m]; the first from
+        robot_base, the last to the TCP.
+    is_revolute : array of bool, shape (dof,)
+    axes_base : array, shape (3, dof)
+        Joint axes in robot_base at zero, unrounded (parallel axes stay parallel).
+    offsets_base : array, shape (3, dof + 1)
+        Vectors from origin to origin in robot_base at zero [m].
+    R_base_tcp_zero : array, shape (3, 3)
+        Orientation of the TCP at zero.
+    """
+
+    T_fixed: FloatArray
+    is_revolute: BoolArray
+    axes_base: FloatArray
+    offsets_base: FloatArray
+    R_base_tcp_zero: FloatArray
+    _parts: FloatArray = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "_parts", _joint_parts(self.T_fixed[:-1]))
+
+    @classmethod
+    def from_robot(cls, robot: RobotModel) -> SerialChain:
+        """Read the chain off a Pinocchio model."""
+        model = robot.model
+        data, q_zero = model.createData(), np.zeros(model.nq)
+        pin.framesForwardKinematics(model, data, q_zero)
+        base = pin.SE3(robot.T_root_base)
+        tcp = base.actInv(data.oMf[model.getFrameId(TCP_FRAME)])
+        zero, axes = [np.eye(4)], []
+        for joint in range(1, model.njoints):
+            placement = base.actInv(data.oMi[joint])
+            axis = _axis_in_joint(model.joints[joint], model)
+            axes.append(placement.rotation @ axis)
+            R = placement.rotation @ _frame_with_z(axis)
+            zero.append(transform_from_parts(R, placement.translation))
+        zero.append(np.array(tcp.homogeneous))
+        T = np.array(zero)
+        return cls(
+            T_fixed=inverse_transform(T[:-1]) @ T[1:],
+            is_revolute=robot.is_revolute,
+            axes_base=np.array(axes).T,
+            offsets_base=np.diff(T[:, :3, 3], axis=0).T.copy(),
+            R_base_tcp_zero=tcp.rotation.copy(),
+        )
+
+    @property
+    def dof(self) -> int:
+        """Number of joints."""
+        return len(self.is_revolute)
+
+    def forward_many(self, Q: FloatArray) -> FloatArray:
+        """TCP poses T_base_tcp, (n, dof) to (n, 4, 4)."""
+        Q = np.asarray(Q, float).reshape(-1, self.dof)
+        T = np.empty((len(Q), 4, 4))
+        for start in range(0, len(Q), _BLOCK):
+            block = slice(start, start + _BLOCK)
+            steps = self._steps(Q[block])
+            T_block = steps[0]
+            for step in steps[1:]:
+                T_block = T_block @ step
+            T[block] = T_block @ self.T_fixed[-1]
+        return T
+
+    def joint_frames_many(self, Q: FloatArray) -> FloatArray:
+        """Frames of the joints in robot_base, z along the axis, (n, dof, 4, 4)."""
+        steps = self._steps(np.asarray(Q, float))
+        frames = [steps[0]]
+        for step in steps[1:]:
+            frames.append(frames[-1] @ step)
+        return np.stack(frames, axis=1)
+
+    @staticmethod
+    def joint_rotations(model: Any) -> FloatArray:
+        """Each joint frame of this chain in Pinocchio's joint frame, (dof, 3, 3)."""
+        axes = [_axis_in_joint(joint, model) for joint in list(model.joints)[1:]]
+        return np.array([_frame_with_z(axis) for axis in axes])
+
+    def jacobian_many(self, Q: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """TCP poses and geometric Jacobians in robot_base.
+
+        Parameters
+        ----------
+        Q : array, shape (n, dof)
+
+        Returns
+        -------
+        T_base_tcp : array, shape (n, 4, 4)
+        J : array, shape (n, 6, dof)
+            Rows: velocity of the TCP [m/rad], angular velocity.
+        """
+        F = self.joint_frames_many(Q)
+        T = F[:, -1] @ self.T_fixed[-1]
+        z, arm = F[:, :, :3, 2], T[:, None, :3, 3] - F[:, :, :3, 3]
+        J = np.zeros((len(Q), 6, self.dof))
+        J[:, :3] = np.swapaxes(
+            np.where(self.is_revolute[:, None], np.cross(z, arm), z), 1, 2
+        )
+        J[:, 3:] = np.swapaxes(np.where(self.is_revolute[:, None], z, 0.0), 1, 2)
+        return T, J
+
+    def _steps(self, Q: FloatArray) -> FloatArray:
+        """Compute the transforms from joint to joint, (n, dof) to (dof, n, 4, 4)."""
+        # Per joint F Rz(q) = A + cos(q) B + sin(q) C: three sweeps over contiguous
+        # memory; a matrix product would be faster, but rounds differently by size.
+        A, B, C = self._parts
+        steps = np.cos(Q.T)[:, :, None] * B[:, None]
+        steps += np.sin(Q.T)[:, :, None] * C[:, None]
+        steps += A[:, None]
+        steps = steps.reshape(self.dof, len(Q), 4, 4)
+        for k in np.flatnonzero(~self.is_revolute):
+            steps[k] = self.T_fixed[k]
+            steps[k, :, :, 3] += Q[:, k, None] * self.T_fixed[k, :, 2]
+        return np.asarray(steps)
+
+
+def pose_error(T_goal: FloatArray, T: FloatArray) -> FloatArray:
+    """Position and rotation from T to the goal, in robot_base.
+
+    Parameters
+    ----------
+    T_goal, T : array, shape (n, 4, 4)
+
+    Returns
+    -------
+    array, shape (n, 6)
+        Translation [m] and rotation vector [rad]; its length is exact near 0 and
+        its direction is not reliable within 1e-6 of a half turn.
+    """
+    error = np.empty((len(T), 6))
+    error[:, :3] = T_goal[:, :3, 3] - T[:, :3, 3]
+    G, R = T_goal[:, :3, :3], T[:, :3, :3]
+    D = (G[:, :, None, :] * R[:, None, :, :]).sum(-1)
+    v = 0.5 * np.stack(
+        (D[:, 2, 1] - D[:, 1, 2], D[:, 0, 2] - D[:, 2, 0], D[:, 1, 0] - D[:, 0, 1]), 1
+    )
+    sine = np.sqrt((v * v).sum(1))
+    angle = np.arctan2(sine, 0.5 * (D[:, 0, 0] + D[:, 1, 1] + D[:, 2, 2] - 1.0))
+    scale = np.where(sine > 1e-12, angle / np.maximum(sine, 1e-12), 1.0)
+    error[:, 3:] = v * scale[:, None]
+    return error
+
+
+def _joint_parts(fixed: FloatArray) -> FloatArray:
+    """Split joint transforms into constant, cosine and sine part, (3, dof, 16)."""
+    parts = np.zeros((3, *fixed.shape))
+    parts[0, :, :, 2:] = fixed[..., 2:]
+    parts[1, :, :, :2] = fixed[..., :2]
+    parts[2, :, :, 0] = fixed[..., 1]
+    parts[2, :, :, 1] = -fixed[..., 0]
+    return parts.reshape(3, len(fixed), 16)
+
+
+def _axis_in_joint(joint: object, model: object) -> FloatArray:
+    data = joint.createData()  # type: ignore[attr-defined]
+    joint.calc(data, np.zeros(model.nq), np.zeros(model.nv))  # type: ignore[attr-defined]
+    motion = np.asarray(data.S).reshape(6, -1)[:, 0]
+    return motion[3:] if np.any(motion[3:]) else motion[:3]
+
+
+def _frame_with_z(axis: FloatArray) -> FloatArray:
+    """Right-handed rotation whose z axis is the given unit vector."""
+    z = axis / np.linalg.norm(axis)
+    helper = np.eye(3)[int(np.argmin(np.abs(z)))]
+    x = np.cross(helper, z)
+    x /= np.linalg.norm(x)
+    return np.column_stack((x, np.cross(z, x), z))

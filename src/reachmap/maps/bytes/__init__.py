@@ -1,0 +1,1 @@
+"""Artefacts as bytes: HDF5 images, hashes, seals, whole-or-nothing publishing."""

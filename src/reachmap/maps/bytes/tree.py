@@ -1,0 +1,121 @@
+"""An artefact in memory, before it is a file: named arrays, texts and attributes.
+
+Nothing here knows HDF5. Checksums, contract checks and the conversion to records work
+on this form; :mod:`reachmap.maps.bytes.hdf5` turns it into bytes and back.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[Any]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Leaf:
+    """An array with named dimensions, or a text.
+
+    Attributes
+    ----------
+    value : array or str
+    dims : tuple of str
+        One name per dimension; a coordinate array is named like its dimension.
+    attributes : mapping
+        Strings, numbers, or lists of either.
+    """
+
+    value: Array | str
+    dims: tuple[str, ...] = ()
+    attributes: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tree:
+    """Everything an artefact holds.
+
+    Attributes
+    ----------
+    attributes : mapping
+        Of the root.
+    groups : mapping of str to mapping
+        Path of each group ("cubes/right") to its attributes.
+    leaves : mapping of str to Leaf
+        Path of each array or text ("cubes/right/status") to what it holds.
+    """
+
+    attributes: dict[str, Any] = field(default_factory=dict)
+    groups: dict[str, dict[str, Any]] = field(default_factory=dict)
+    leaves: dict[str, Leaf] = field(default_factory=dict)
+
+    def array(self, path: str) -> Array:
+        """Return the array at a path; a text there is a mistake of the caller."""
+        value = self.leaves[path].value
+        if isinstance(value, str):
+            raise TypeError(f"{path} is a text")
+        return value
+
+    def text(self, path: str) -> str:
+        """Return the text at a path, or "" where there is none."""
+        leaf = self.leaves.get(path)
+        return leaf.value if leaf is not None and isinstance(leaf.value, str) else ""
+
+    def cubes(self) -> list[str]:
+        """Names of the cubes of a workspace map, in order."""
+        return [
+            name
+            for group, _, name in (path.rpartition("/") for path in self.groups)
+            if group == "cubes"
+        ]
+
+    def arrays(self) -> Iterator[tuple[str, Leaf, Array]]:
+        """Path, leaf and value of every array."""
+        for path, leaf in self.leaves.items():
+            if not isinstance(leaf.value, str):
+                yield path, leaf, leaf.value
+
+
+def plain(value: Any) -> Any:
+    """Turn a value into what JSON knows: NumPy scalars, arrays, tuples become plain.
+
+    Raises
+    ------
+    TypeError
+        For anything else, so that nothing unforeseen slips into a checksum.
+    """
+    if value is None or isinstance(value, bool | int | float | str):
+        return value
+    if isinstance(value, np.generic | np.ndarray):
+        return plain(value.tolist())
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(item) for item in value]
+    raise TypeError(f"{type(value).__name__} has no plain form")
+
+
+def json_ready(value: Any) -> Any:
+    """Plain values; keys that are states are their names, NaN and infinity are null.
+
+    Examples
+    --------
+    >>> json_ready({"mean": float("nan"), "counts": (1, 2)})
+    {'mean': None, 'counts': [1, 2]}
+    """
+    if isinstance(value, Mapping):
+        return {
+            key.name.lower() if isinstance(key, Enum) else str(key): json_ready(item)
+            for key, item in value.items()
+        }
+    if isinstance(value, list | tuple):
+        return [json_ready(item) for item in value]
+    value = plain(value)
+    if isinstance(value, list):
+        return [json_ready(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value

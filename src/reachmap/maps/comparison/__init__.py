@@ -1,0 +1,1 @@
+"""Two maps of one kind held against each other, frame by frame."""

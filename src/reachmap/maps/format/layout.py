@@ -1,0 +1,263 @@
+"""How the format of an artefact is written down: variables, dimensions, attributes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Final
+
+from reachmap.maps.bytes.tree import Tree
+from reachmap.maps.records import Status
+
+STATUS_MEANINGS = " ".join(item.name.lower() for item in Status)
+STATUS_CODES = tuple(int(item) for item in Status)
+
+FORMAT_VERSION = "1.0"
+FORMAT_PREFIX = "reachmap."
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Variable:
+    """One array of an artefact.
+
+    Attributes
+    ----------
+    path : str
+        Where it is; ``{cube}`` stands for the name of each cube.
+    dims : tuple of str
+    dtype : str
+        As NumPy names it, little-endian: "f8", "u1", "i4".
+    units : str
+        "m", "rad", "s", "percent", or "1" for pure numbers.
+    meaning : str
+        One sentence, stored as ``long_name``.
+    frame : str
+        Frame that coordinates are given in, or "".
+    low, high : float or None
+        Range of the numbers, NaN aside.
+    nan : bool
+        Whether NaN may stand for "there is none".
+    labels : str
+        Name of an attribute that lists texts for the variable ("body_pairs"), or "".
+        A coordinate has one text for each of its numbers.
+    is_index : bool
+        Whether the numbers count in that list.
+    is_status : bool
+        Whether the numbers are :class:`~reachmap.maps.records.Status` codes.
+    is_flag : bool
+        Whether the numbers are 0 for no and 1 for yes.
+    """
+
+    path: str
+    dims: tuple[str, ...]
+    dtype: str
+    units: str
+    meaning: str
+    frame: str = ""
+    low: float | None = None
+    high: float | None = None
+    nan: bool = False
+    labels: str = ""
+    is_index: bool = False
+    is_status: bool = False
+    is_flag: bool = False
+
+    @property
+    def name(self) -> str:
+        """Last part of the path."""
+        return self.path.rpartition("/")[2]
+
+    @property
+    def group(self) -> str:
+        """Group it lies in, "" for the root."""
+        return self.path.rpartition("/")[0]
+
+
+@dataclass(frozen=True, slots=True)
+class Kind:
+    """What messages call a kind of artefact, and the command that makes it."""
+
+    name: str
+    command: str
+
+
+KINDS: Final[dict[str, Kind]] = {
+    "workspace_map": Kind("workspace map", "reachmap workspace-scan"),
+    "bin_map": Kind("bin map", "reachmap bin-scan"),
+    "bin_placement": Kind("bin placement", "reachmap place-bin"),
+}
+"""Every kind of artefact, also for readers that know the layout of one alone."""
+
+
+def kind_of_format(format_name: object) -> str | None:
+    """Kind that a ``format`` attribute names; None if it is not one of ours."""
+    kind = str(format_name).removeprefix(FORMAT_PREFIX)
+    return kind if kind in KINDS and format_name == FORMAT_PREFIX + kind else None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Layout:
+    """The format of one kind of artefact.
+
+    Attributes
+    ----------
+    kind : str
+        Short name; ``format`` is ``reachmap.<kind>``.
+    title : str
+    signal, axes : str, tuple of str
+        What a NeXus viewer plots first.
+    variables : tuple of Variable
+    attributes : mapping of str to str
+        Root attributes of this kind besides those of every artefact, with what they
+        mean.
+    check : callable
+        Whether the numbers agree with each other; sentences where they do not.
+    """
+
+    kind: str
+    title: str
+    signal: str
+    axes: tuple[str, ...]
+    variables: tuple[Variable, ...]
+    attributes: dict[str, str]
+    check: Callable[[Tree], list[str]]
+
+    @property
+    def format(self) -> str:
+        """Value of the root attribute ``format``."""
+        return FORMAT_PREFIX + self.kind
+
+    @property
+    def name(self) -> str:
+        """What a message calls it."""
+        return KINDS[self.kind].name
+
+    @property
+    def command(self) -> str:
+        """The command that makes it."""
+        return KINDS[self.kind].command
+
+
+COMMON_ATTRIBUTES = {
+    "Conventions": "Metadata conventions, `CF-1.11`.",
+    "format": "Kind of artefact.",
+    "format_version": "Version of the format; a reader accepts its own major version.",
+    "title": "One line for people.",
+    "NX_class": "`NXdata`, so that NeXus viewers find the default plot.",
+    "signal": "Variable of the default plot.",
+    "axes": "Its dimensions, one name each.",
+    "frame": "Frame of everything that does not name its own: `robot_base`.",
+    "seed": "Seed of all random choices (uint64).",
+    "cell_sha256": "Hash of the cell's contents, meshes included.",
+    "config_sha256": "Hash of everything that determines the result.",
+    "content_sha256": "Hash of the result without measured times.",
+    "integrity_sha256": "Hash of everything in the file.",
+}
+"""Root attributes of every artefact, with what they mean."""
+
+PROVENANCE_TEXTS = {
+    "cell_yaml": "The cell file as read.",
+    "cell_resolved_json": "The cell after defaults and overrides, as JSON.",
+    "overrides_json": "The `--set` assignments in order, as a JSON list.",
+    "urdf": "The robot description after xacro.",
+    "srdf": "The semantic description, empty if there is none.",
+    "files_sha256_json": "Each mesh and the sha256 of its bytes, as a JSON object.",
+    "packages_json": "Each package and its version, as a JSON object.",
+    "settings_json": "Method, planner, checking and simplification, as a JSON object.",
+    "source_sha256": "`content_sha256` of the artefact this one is made from.",
+}
+"""Texts of ``/provenance``, with what they hold."""
+
+RUN_TEXTS = {
+    "started": "When the run began, ISO 8601 with offset.",
+    "finished": "When it ended.",
+    "host": "Name of the machine.",
+    "command_line": "The command as typed.",
+    "workers": "Number of workers, as a decimal number.",
+    "wall_s_json": "Phase to wall-clock seconds, as a JSON object.",
+    "cpu_s_json": "Phase to CPU seconds of all workers, as a JSON object.",
+}
+"""Texts of ``/run``, with what they hold."""
+
+
+PERCENT: Final[dict[str, Any]] = {"units": "percent", "low": 0.0, "high": 100.0}
+NONNEGATIVE: Final[dict[str, Any]] = {"low": 0.0, "nan": True}
+
+
+def index(path: str, meaning: str, **more: Any) -> Variable:
+    """Describe a coordinate that only counts."""
+    name = path.rpartition("/")[2]
+    return Variable(
+        path=path, dims=(name,), dtype="i4", units="1", meaning=meaning, low=0, **more
+    )
+
+
+def coordinate(path: str, meaning: str, frame: str) -> Variable:
+    """Describe a coordinate in metres."""
+    name = path.rpartition("/")[2]
+    return Variable(
+        path=path, dims=(name,), dtype="f8", units="m", meaning=meaning, frame=frame
+    )
+
+
+def outcome(prefix: str, dims: tuple[str, ...]) -> tuple[Variable, ...]:
+    """Describe what both maps say of a test frame."""
+    return (
+        Variable(
+            path=f"{prefix}status",
+            dims=dims,
+            dtype="u1",
+            units="1",
+            meaning="What became of the test frame.",
+            is_status=True,
+        ),
+        Variable(
+            path=f"{prefix}blocking_pair",
+            dims=dims,
+            dtype="i4",
+            units="1",
+            meaning="The two bodies in collision, an index into body_pairs; -1: none.",
+            low=-1,
+            labels="body_pairs",
+            is_index=True,
+        ),
+        Variable(
+            path=f"{prefix}n_ik",
+            dims=dims,
+            dtype="u1",
+            units="1",
+            meaning="Distinct solutions of the inverse kinematics.",
+        ),
+        Variable(
+            path=f"{prefix}n_ik_free",
+            dims=dims,
+            dtype="u1",
+            units="1",
+            meaning="Solutions of the inverse kinematics that are free of collision.",
+        ),
+    )
+
+
+def goal(prefix: str, dims: tuple[str, ...], which: str) -> Variable:
+    """Describe the joint positions that a result rests on."""
+    return Variable(
+        path=f"{prefix}goal_configuration",
+        dims=(*dims, "joint"),
+        dtype="f8",
+        units="rad",
+        meaning=f"Joint positions at the test frame{which}; NaN where there are none.",
+        nan=True,
+    )
+
+
+COMMON_SCALES = (
+    index("joint", "Joints, in the order of joint_names.", labels="joint_names"),
+    index("quat", "Parts of a quaternion: w, x, y, z."),
+)
+SCAN = Variable(
+    path="scan_configuration",
+    dims=("joint",),
+    dtype="f8",
+    units="rad",
+    meaning="Joint positions from which every path starts.",
+)

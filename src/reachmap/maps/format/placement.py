@@ -1,0 +1,261 @@
+"""Bin placements: record to file and back."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from reachmap.maps.bytes.tree import Tree
+from reachmap.maps.format.assembly import assemble, provenance_of, run_of, stamp_of
+from reachmap.maps.format.checks import check_pose, require
+from reachmap.maps.format.layout import PERCENT, SCAN, Layout, Variable, index
+from reachmap.maps.format.store import load, store
+from reachmap.maps.records import BinPlacement
+
+
+def check_placement(tree: Tree) -> list[str]:
+    """Check the chosen row against the pose, and reasons against missing scores."""
+    score, reason = tree.array("score"), tree.array("reason")
+    problems = check_pose(tree.array("bin_pose"))
+    for name, least in (("chosen", 0), ("runner_up", -1), ("paper_choice", -1)):
+        row = tree.attributes.get(name)
+        if not isinstance(row, int) or not least <= row < len(score):
+            problems.append(
+                f"the root attribute {name} must be a row of the candidates"
+            )
+    problems += require(
+        np.isnan(score) == (reason != 0),
+        "reason must be given exactly where a candidate has no score",
+    )
+    if not problems:
+        chosen = tree.array("candidate_position")[tree.attributes["chosen"]]
+        if not np.allclose(chosen, tree.array("bin_pose")[:3, 3], atol=1e-6):
+            problems.append("bin_pose must be the pose of the chosen candidate")
+    return problems
+
+
+def _per_candidate(
+    name: str, dtype: str, units: str, meaning: str, **more: Any
+) -> Variable:
+    return Variable(
+        path=name,
+        dims=("candidate",),
+        dtype=dtype,
+        units=units,
+        meaning=meaning,
+        **more,
+    )
+
+
+PLACEMENT = Layout(
+    kind="bin_placement",
+    check=check_placement,
+    title="Where the bin goes in a robot cell",
+    signal="score",
+    axes=("candidate",),
+    attributes={
+        "chosen": "Row of the chosen candidate.",
+        "runner_up": "Row of the best candidate in another place, -1: none.",
+        "paper_choice": "Row of the paper's own choice, -1: none.",
+        "rule": "Rule that chose: `search`, `paper` or `given`.",
+        "joint_names": "Names of the joints, in order.",
+        "reasons": "Reasons for excluding a candidate; the first is the empty one.",
+    },
+    variables=(
+        index("candidate", "Poses that were considered."),
+        index("joint", "Joints, in the order of joint_names.", labels="joint_names"),
+        index("pose_row", "Rows of a homogeneous matrix."),
+        index("pose_column", "Columns of a homogeneous matrix."),
+        index("xyz", "Coordinates x, y, z."),
+        index("shift", "Directions of shift_margin.", labels="shift_directions"),
+        index("turn", "Directions of turn_margin.", labels="turn_directions"),
+        Variable(
+            path="bin_pose",
+            dims=("pose_row", "pose_column"),
+            dtype="f8",
+            units="m",
+            meaning="T_base_bin of the chosen bin; the rotation block has no unit.",
+            frame="robot_base",
+        ),
+        SCAN,
+        Variable(
+            path="candidate_position",
+            dims=("candidate", "xyz"),
+            dtype="f8",
+            units="m",
+            meaning="Centre of the bin's inner bottom.",
+            frame="robot_base",
+        ),
+        _per_candidate(
+            "candidate_yaw",
+            "f8",
+            "rad",
+            "Angle of the bin about z.",
+            frame="robot_base",
+        ),
+        _per_candidate(
+            "score",
+            "f8",
+            meaning="Mean path reachability over the pick volume; NaN: excluded.",
+            nan=True,
+            **PERCENT,
+        ),
+        _per_candidate(
+            "worst_point",
+            "f8",
+            meaning="Path reachability of the worst point of the pick volume.",
+            nan=True,
+            **PERCENT,
+        ),
+        _per_candidate(
+            "reachable_share",
+            "f8",
+            meaning="Share of test frames that can be reached.",
+            nan=True,
+            **PERCENT,
+        ),
+        _per_candidate(
+            "exact",
+            "u1",
+            "1",
+            "1 where the bin was in the scene, 0 where the map was interpolated.",
+            is_flag=True,
+        ),
+        _per_candidate(
+            "reason",
+            "i4",
+            "1",
+            "Why the candidate is excluded, an index into reasons; 0: it is not.",
+            low=0,
+            labels="reasons",
+            is_index=True,
+        ),
+        Variable(
+            path="shift_margin",
+            dims=("shift",),
+            dtype="f8",
+            units="m",
+            meaning="How far the bin can be moved before the score drops by 5 points.",
+            low=0.0,
+        ),
+        Variable(
+            path="turn_margin",
+            dims=("turn",),
+            dtype="f8",
+            units="rad",
+            meaning="How far the bin can be turned before the score drops by 5 points.",
+            low=0.0,
+        ),
+    ),
+)
+
+
+_ARRAYS = (
+    "bin_pose", "scan_configuration", "score", "worst_point", "reachable_share",
+    "exact",
+)  # fmt: skip
+_ROWS = ("chosen", "runner_up", "paper_choice")
+
+
+def write_placement(path: Path, record: BinPlacement, overwrite: bool = False) -> str:
+    """Write a bin placement.
+
+    Parameters
+    ----------
+    path : Path
+    record : BinPlacement
+        Its ``stamp.content_sha256`` is not used: it is computed from the numbers.
+    overwrite : bool
+        Whether an existing file may be replaced.
+
+    Returns
+    -------
+    str
+        ``content_sha256``.
+
+    Raises
+    ------
+    OutputError
+        The file exists, or nothing can be written there.
+    EngineError
+        The record breaks the format.
+    """
+    return store(path, tree_from_placement(record), PLACEMENT, overwrite=overwrite)
+
+
+def tree_from_placement(record: BinPlacement) -> Tree:
+    """Everything that the file will hold."""
+    reasons = ("", *sorted(set(record.reason) - {""}))
+    shift = {k: v for k, v in record.margin.items() if not is_turn(k)}
+    turn = {k: v for k, v in record.margin.items() if is_turn(k)}
+    poses = np.reshape(record.candidate_pose, (-1, 4))
+    arrays: dict[str, Any] = {name: getattr(record, name) for name in _ARRAYS}
+    arrays.update(
+        candidate_position=poses[:, :3],
+        candidate_yaw=poses[:, 3],
+        reason=np.array([reasons.index(text) for text in record.reason], np.int64),
+        shift_margin=np.array(list(shift.values()), float),
+        turn_margin=np.array(list(turn.values()), float),
+    )
+    return assemble(
+        PLACEMENT,
+        arrays=arrays,
+        attributes={
+            **{name: int(getattr(record, name)) for name in _ROWS},
+            "rule": record.rule,
+        },
+        labels={
+            "joint_names": record.joint_names,
+            "reasons": reasons,
+            "shift_directions": tuple(shift),
+            "turn_directions": tuple(turn),
+        },
+        stamp=record.stamp,
+        provenance=record.provenance,
+        run=record.run,
+    )
+
+
+def is_turn(direction: str) -> bool:
+    """Whether a direction of the margin is an angle, as "+yaw" is."""
+    return direction.lstrip("+-") in ("roll", "pitch", "yaw")
+
+
+def read_placement(path: Path) -> BinPlacement:
+    """Read a bin placement; everything about it is checked.
+
+    Raises
+    ------
+    MapFileError
+        The file is missing, damaged, or something else.
+    """
+    tree, _ = load(path, PLACEMENT)
+    return placement_from_tree(tree, path)
+
+
+def placement_from_tree(tree: Tree, path: Path) -> BinPlacement:
+    """Turn a checked tree into a record; ``path`` is named in messages."""
+    reasons = tree.attributes["reasons"]
+    stored: dict[str, Any] = {name: tree.array(name) for name in _ARRAYS}
+    stored.update({name: int(tree.attributes[name]) for name in _ROWS})
+    position, yaw = tree.array("candidate_position"), tree.array("candidate_yaw")
+    return BinPlacement(
+        **stored,
+        rule=str(tree.attributes["rule"]),
+        candidate_pose=np.column_stack([position, yaw]),
+        reason=tuple(str(reasons[code]) for code in tree.array("reason")),
+        margin={**_margin(tree, "shift"), **_margin(tree, "turn")},
+        joint_names=tuple(tree.attributes["joint_names"]),
+        stamp=stamp_of(tree),
+        provenance=provenance_of(tree, path),
+        run=run_of(tree, path),
+    )
+
+
+def _margin(tree: Tree, name: str) -> Mapping[str, float]:
+    directions = tree.leaves[name].attributes[f"{name}_directions"]
+    values = tree.array(f"{name}_margin").tolist()
+    return dict(zip(directions, values, strict=True))

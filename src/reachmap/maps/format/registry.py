@@ -1,0 +1,66 @@
+"""Reading an artefact whose kind is not known beforehand."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Final, TypeAlias
+
+from reachmap.maps.bytes.tree import Tree
+from reachmap.maps.format.assembly import provenance_of
+from reachmap.maps.format.bin import BIN, bin_map_from_tree
+from reachmap.maps.format.layout import Layout
+from reachmap.maps.format.placement import PLACEMENT, placement_from_tree
+from reachmap.maps.format.store import load
+from reachmap.maps.format.workspace import WORKSPACE, workspace_map_from_tree
+from reachmap.maps.records import BinMap, BinPlacement, Provenance, WorkspaceMap
+
+Artefact: TypeAlias = WorkspaceMap | BinMap | BinPlacement
+
+_RECORDS: Final[dict[str, Callable[[Tree, Path], Artefact]]] = {
+    "workspace_map": workspace_map_from_tree,
+    "bin_map": bin_map_from_tree,
+    "bin_placement": placement_from_tree,
+}
+
+
+def read_artefact(path: Path) -> Artefact:
+    """Read an artefact of any kind; everything about it is checked.
+
+    Raises
+    ------
+    MapFileError
+        The file is missing, damaged, or no artefact at all.
+    """
+    tree, layout = load_any(path)
+    return _RECORDS[layout.kind](tree, path)
+
+
+def kind_of(record: Artefact) -> str:
+    """Kind of a record, as in ``"bin_map"``."""
+    if isinstance(record, WorkspaceMap):
+        return "workspace_map"
+    return "bin_map" if isinstance(record, BinMap) else "bin_placement"
+
+
+LAYOUTS: Final[dict[str, Layout]] = {
+    layout.kind: layout for layout in (WORKSPACE, BIN, PLACEMENT)
+}
+"""Kind to format."""
+
+
+def load_any(path: Path) -> tuple[Tree, Layout]:
+    """Read an artefact of any kind as a tree; see :func:`store.load`."""
+    return load(path, *LAYOUTS.values())
+
+
+def read_provenance(path: Path) -> Provenance:
+    """Read what any artefact was made from.
+
+    Raises
+    ------
+    MapFileError
+        The file is not an artefact, or it is damaged.
+    """
+    tree, _ = load_any(path)
+    return provenance_of(tree, path)

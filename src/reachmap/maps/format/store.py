@@ -1,0 +1,212 @@
+"""Artefacts on disk: written whole or not at all, read checked or not at all."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from reachmap.errors import EngineError, MapFileError, ReachmapError
+from reachmap.maps.bytes.hashing import content_sha256, integrity_sha256
+from reachmap.maps.bytes.hdf5 import (
+    MAX_BYTES,
+    StructureError,
+    identity_from_image,
+    image_from_tree,
+    tree_from_image,
+)
+from reachmap.maps.bytes.integrity import (
+    SIGNATURE,
+    named_size,
+    reason_against,
+    seal,
+    unseal,
+)
+from reachmap.maps.bytes.publish import publish
+from reachmap.maps.bytes.tree import Tree
+from reachmap.maps.format.contract import check_ranges, check_structure
+from reachmap.maps.format.layout import (
+    FORMAT_VERSION,
+    KINDS,
+    Layout,
+    kind_of_format,
+)
+
+MAX_PROBLEMS = 8
+"""Mistakes of one file that are listed before the rest is only counted."""
+
+
+def store(path: Path, tree: Tree, layout: Layout, *, overwrite: bool = False) -> str:
+    """Check an artefact against its own format and put it in place.
+
+    Returns
+    -------
+    str
+        Its ``content_sha256``.
+
+    Raises
+    ------
+    EngineError
+        It breaks its format: a defect of the producer, nothing is written.
+    OutputError
+        It cannot be written there.
+    """
+    problems = check_tree(tree, layout)
+    if problems:
+        raise EngineError(f"{path}: not written, {text}" for text in _listed(problems))
+    image = image_from_tree(tree)
+    publish(path, [image, seal(image)], overwrite=overwrite)
+    return str(tree.attributes["content_sha256"])
+
+
+def load(path: Path, *layouts: Layout) -> tuple[Tree, Layout]:
+    """Read an artefact, checked from the bytes up to what its numbers say.
+
+    Parameters
+    ----------
+    path : Path
+    *layouts : Layout
+        What is expected: one of these.
+
+    Raises
+    ------
+    MapFileError
+        The file is missing, damaged, of another kind, of a newer major version or
+        not an artefact at all.
+    """
+    image = read_image(path, layouts)
+    try:
+        found = identify(path, identity_from_image(image), layouts)
+        tree = tree_from_image(image)
+    except StructureError as error:
+        raise MapFileError(f"{path}: damaged, {error}; {_expected(layouts)}") from error
+    problems = check_hashes(tree)[:1] or check_tree(tree, found)
+    if problems:
+        raise MapFileError(
+            f"{path}: damaged {found.name}, {text}; `{found.command}` makes a new one"
+            for text in _listed(problems)
+        )
+    return tree, found
+
+
+def check_tree(tree: Tree, layout: Layout) -> list[str]:
+    """Check structure, then ranges, then what the numbers say to each other."""
+    return check_structure(tree, layout) or (
+        check_ranges(tree, layout) + layout.check(tree)
+    )
+
+
+def check_hashes(tree: Tree) -> list[str]:
+    """Compare both checksums with the contents."""
+    problems = []
+    if tree.attributes.get("content_sha256") != content_sha256(tree):
+        problems.append("its content does not match content_sha256")
+    if tree.attributes.get("integrity_sha256") != integrity_sha256(tree):
+        problems.append("it was changed after it was written (integrity_sha256)")
+    return problems
+
+
+def read_image(path: Path, layouts: Sequence[Layout] = ()) -> bytes:
+    """Read a file as an HDF5 image that is safe to hand to the HDF5 library."""
+    image, intact = unseal(read_bytes(path, layouts))
+    if not image.startswith(SIGNATURE):
+        raise MapFileError(f"{path}: {_foreign(image)}; {_expected(layouts)}")
+    if damage := _damage(image, intact):
+        raise MapFileError(f"{path}: damaged, {damage}; {_expected(layouts)}")
+    return image
+
+
+def _damage(image: bytes, intact: bool | None) -> str:
+    """What is wrong with the bytes of an image, "" if nothing is."""
+    if intact is not None:
+        return "" if intact else "its bytes do not match its seal"
+    size = named_size(image)
+    if size is None or len(image) < size:
+        return f"{len(image)} of {size or 'at least 48'} bytes are left"
+    return reason_against(image)
+
+
+def read_bytes(path: Path, layouts: Sequence[Layout] = ()) -> bytes:
+    """Read a file, in words a user can act on when that fails."""
+    try:
+        size = Path(path).stat().st_size
+        data = Path(path).read_bytes() if size <= MAX_BYTES else b""
+    except FileNotFoundError as error:
+        raise MapFileError(f"{path}: no such file; {_expected(layouts)}") from error
+    except OSError as error:
+        reason = error.strerror or type(error).__name__
+        raise MapFileError(f"{path}: cannot be read ({reason})") from error
+    if size > MAX_BYTES:
+        raise MapFileError(f"{path}: larger than {MAX_BYTES >> 30} GiB")
+    return data
+
+
+def is_sealed(path: Path) -> bool:
+    """Whether a file still carries the seal it was written with, and it fits."""
+    return unseal(read_bytes(path))[1] is True
+
+
+def artefact_kind(path: Path) -> str | None:
+    """Kind of an artefact, as in ``"bin_map"``; None for anything else.
+
+    Never raises. Only the seal and the root attributes are looked at.
+    """
+    try:
+        image = read_image(Path(path))
+        return kind_of_format(identity_from_image(image).get("format"))
+    except (ReachmapError, ValueError, StructureError):
+        return None
+
+
+def identify(
+    path: Path, attributes: Mapping[str, object], layouts: Sequence[Layout]
+) -> Layout:
+    """Say which layout a file follows; refuse other kinds and newer versions."""
+    name = attributes.get("format")
+    kind = kind_of_format(name)
+    if kind is None:
+        what = f"of the format {name!r}" if name else "with no format"
+        raise MapFileError(f"{path}: an HDF5 file {what}; {_expected(layouts)}")
+    found = next((layout for layout in layouts if layout.kind == kind), None)
+    if found is None:
+        raise MapFileError(
+            f"{path}: a {KINDS[kind].name} ({name}), which `{KINDS[kind].command}` "
+            f"makes; "
+            f"{_expected(layouts)}"
+        )
+    version = str(attributes.get("format_version"))
+    own = FORMAT_VERSION.partition(".")[0]
+    if not re.fullmatch(r"[0-9]{1,6}\.[0-9]{1,6}", version):
+        raise MapFileError(f"{path}: damaged, its format_version is {version!r}")
+    if version.partition(".")[0] != own:
+        raise MapFileError(
+            f"{path}: a {found.name} of version {version}, but this reachmap reads "
+            f"{own}.x; a newer reachmap may read it"
+        )
+    return found
+
+
+def _expected(layouts: Sequence[Layout]) -> str:
+    if len(layouts) != 1:
+        names = ", ".join(kind.name for kind in KINDS.values())
+        return f"expected one of reachmap's artefacts: {names}"
+    (layout,) = layouts
+    return f"expected a {layout.name} ({layout.format}), which `{layout.command}` makes"
+
+
+def _foreign(data: bytes) -> str:
+    """Name what a file is that is not HDF5."""
+    if not data:
+        return "an empty file"
+    if re.match(rb"\s*(\{|\[\s*[\[{\"\d-])", data):
+        return "looks like JSON, not an HDF5 file"
+    if b"\0" not in data[:4096]:
+        return "a text, not an HDF5 file"
+    return "not an HDF5 file"
+
+
+def _listed(problems: list[str]) -> list[str]:
+    """Keep the first few mistakes, and say how many more there are."""
+    shown = problems[:MAX_PROBLEMS]
+    rest = len(problems) - len(shown)
+    return [*shown, f"and {rest} more mistakes"] if rest else shown

@@ -1,0 +1,1 @@
+"""Figures of a map: Eq. (1), counts, causes, saturation."""

@@ -1,0 +1,97 @@
+"""A bin placement in a few numbers."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+
+import numpy as np
+
+from reachmap.maps.format.placement import is_turn
+from reachmap.maps.records import BinPlacement
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CandidateSummary:
+    """One pose of the bin: position [m], yaw [deg], scores [percent]."""
+
+    row: int
+    x: float
+    y: float
+    z: float
+    yaw_deg: float
+    score: float
+    worst_point: float
+    reachable_share: float
+    exact: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlacementSummary:
+    """A bin placement in a few numbers.
+
+    Attributes
+    ----------
+    rule : str
+    chosen : CandidateSummary
+    runner_up, paper_choice : CandidateSummary or None
+    margin : mapping
+        Direction to how far the bin can move [m], or turn [deg], before the score
+        drops by 5 points.
+    scan_configuration_deg : mapping
+        Joint to position.
+    candidates, exact : int
+        Poses that were considered, and those with the bin in the scene.
+    excluded : mapping
+        Reason to number of candidates, the most frequent first.
+    """
+
+    rule: str
+    chosen: CandidateSummary
+    runner_up: CandidateSummary | None
+    paper_choice: CandidateSummary | None
+    margin: dict[str, float]
+    scan_configuration_deg: dict[str, float]
+    candidates: int
+    exact: int
+    excluded: dict[str, int]
+
+
+def summarise_placement(record: BinPlacement) -> PlacementSummary:
+    """Name the chosen pose, its margin and its rivals."""
+    degrees = np.degrees(record.scan_configuration)
+    return PlacementSummary(
+        rule=record.rule,
+        chosen=_candidate(record, record.chosen),
+        runner_up=_candidate_or_none(record, record.runner_up),
+        paper_choice=_candidate_or_none(record, record.paper_choice),
+        margin={
+            name: float(np.degrees(value)) if is_turn(name) else float(value)
+            for name, value in record.margin.items()
+        },
+        scan_configuration_deg=dict(
+            zip(record.joint_names, degrees.tolist(), strict=True)
+        ),
+        candidates=len(record.score),
+        exact=int(record.exact.sum()),
+        excluded=dict(Counter(text for text in record.reason if text).most_common()),
+    )
+
+
+def _candidate_or_none(record: BinPlacement, row: int) -> CandidateSummary | None:
+    return _candidate(record, row) if row >= 0 else None
+
+
+def _candidate(record: BinPlacement, row: int) -> CandidateSummary:
+    x, y, z, yaw = (float(value) for value in record.candidate_pose[row])
+    return CandidateSummary(
+        row=row,
+        x=x,
+        y=y,
+        z=z,
+        yaw_deg=float(np.degrees(yaw)),
+        score=float(record.score[row]),
+        worst_point=float(record.worst_point[row]),
+        reachable_share=float(record.reachable_share[row]),
+        exact=bool(record.exact[row]),
+    )

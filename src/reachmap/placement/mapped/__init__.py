@@ -1,0 +1,1 @@
+"""Bin poses scored exactly, by mapping test grasps of each."""

@@ -1,0 +1,236 @@
+"""The exact score of a bin pose: roadmap to a sample of frames, bin in the scene.
+
+What a score costs is mostly straight approaches, so they are looked at lazily: one
+branch of each frame's inverse kinematics first, the others only if the frame is not
+reached.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from reachmap._typing import FloatArray, IntArray
+from reachmap.core.planning.approach import StraightApproach
+from reachmap.core.planning.connection import ROADMAP_PLANNER, Connection, connect
+from reachmap.core.planning.planner import Planner
+from reachmap.core.scene import Scene
+from reachmap.geometry import yaw_transform
+from reachmap.placement.mapped.sample import Sample
+
+ATTEMPTS = 1
+ALWAYS = -1.0
+NEVER = 1000.0
+ROUNDING = 1e-9
+Pose = tuple[float, float, float, float]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PoseScore:
+    """How well the arm is served at one pose of the bin.
+
+    Attributes
+    ----------
+    score : float
+        Mean path reachability over the pick volume [percent].
+    worst_point : float
+        Path reachability of the worst of the points that were looked at [percent].
+    reachable_share : float
+        Share of test frames with an IK solution [percent], which no path can exceed.
+    path_length_rad : float
+        Mean over the frames with a path; infinite without any, NaN where the map was
+        interpolated.
+    """
+
+    score: float
+    worst_point: float
+    reachable_share: float
+    path_length_rad: float
+
+
+class PlacedScene:
+    """A cell with its bin at one pose, and what its test frames offer.
+
+    Parameters
+    ----------
+    scene : Scene
+        With a bin that can be moved; must not be used by anybody else meanwhile.
+    pose : (x, y, z [m], yaw [rad])
+    sample : Sample
+
+    Attributes
+    ----------
+    pose : (x, y, z [m], yaw [rad])
+    scene : Scene
+    T : array, shape (frames, 4, 4)
+        T_base_tcp.
+    Q : array, shape (branches, dof)
+        Free configurations of all frames, those nearest to the cell's own scan
+        configuration first in each frame [rad].
+    frame : int array, shape (branches,)
+        Frame of each, rising.
+    """
+
+    def __init__(self, scene: Scene, pose: Pose, sample: Sample) -> None:
+        changed = scene.loaded.with_changes(bin_pose=yaw_transform(*pose))
+        self.pose = pose
+        self.scene = scene.with_bin_of(changed)
+        cell = changed.cell
+        self.T = self.scene.T_base_bin @ sample.T_bin_tcp
+        self._sample = sample
+        self._approach = StraightApproach(
+            self.scene.kinematics,
+            self.scene.motions,
+            cell.robot.tcp.approach_axis,
+            cell.bin_scan.approach_distance_m,
+        )
+        self._survey()
+        self._first: _Goals | None = None
+
+    def _survey(self) -> None:
+        scene = self.scene
+        Q, frame = scene.kinematics.solve_many(self.T, windings=False)
+        self._has_ik = np.bincount(frame, minlength=len(self.T)) > 0
+        free = scene.checker.free_mask(Q)
+        Q, frame = Q[free], frame[free]
+        away = np.round(np.linalg.norm(Q - scene.scan_configuration, axis=1), 9)
+        order = np.lexsort((away, frame))
+        self.Q, self.frame = Q[order], frame[order]
+        self._begin = np.searchsorted(self.frame, np.arange(len(self.T) + 1))
+
+    @property
+    def bound(self) -> float:
+        """What frames with a free configuration count for; no score is higher [%]."""
+        return 100.0 * float(self._sample.weight @ (np.diff(self._begin) > 0))
+
+    def score_from(
+        self, q: FloatArray, *, above: float = ALWAYS, enough: float = NEVER
+    ) -> tuple[float, PoseScore | None]:
+        """Score the pose from a scan configuration.
+
+        Parameters
+        ----------
+        q : array, shape (dof,)
+            Free [rad].
+        above : float
+            The score is not wanted unless it may be above this [percent].
+        enough : float
+            A score from which on no more is looked for [percent].
+
+        Returns
+        -------
+        bound : float
+            No score can be higher.
+        score : PoseScore or None
+            None as soon as the bound is not above ``above``.
+        """
+        if self.bound <= above:
+            return self.bound, None
+        if self._first is None:
+            self._first = self._first_goals(above)
+        first = self._first
+        if first.bound <= above:
+            # Given up half-way: another question may need all of it.
+            self._first = None
+            return first.bound, None
+        connection = self._connect(q, first)
+        score = self._score(connection)
+        if score.score < min(enough, first.bound) - ROUNDING:
+            every = self._with_other_branches(first, connection)
+            if len(every.frame) > len(first.frame):
+                score = self._score(self._connect(q, every))
+        return first.bound, score
+
+    def _first_goals(self, above: float) -> _Goals:
+        """One free approach for each frame that has one, unless too few have."""
+        goals = _Goals(tried=self._begin[:-1].copy(), bound=self.bound)
+        branches = np.diff(self._begin)
+        # Those with few branches first: too low a bound shows sooner.
+        order = np.argsort(branches, kind="stable")
+        for k in order[np.searchsorted(branches[order], 1) :]:
+            while goals.tried[k] < self._begin[k + 1]:
+                if self._try_next(goals, int(k)):
+                    break
+            else:
+                goals.bound -= 100.0 * float(self._sample.weight[k])
+                if goals.bound <= above:
+                    break
+        return goals
+
+    def _with_other_branches(self, first: _Goals, connection: Connection) -> _Goals:
+        """Goals of all branches of the frames that were not reached."""
+        every = first.copy()
+        missed = np.ones(len(self.T), bool)
+        missed[connection.roadmap.frames_reached()] = False
+        for k in np.flatnonzero(missed):
+            while every.tried[k] < self._begin[k + 1]:
+                self._try_next(every, int(k))
+        return every
+
+    def _try_next(self, goals: _Goals, k: int) -> bool:
+        """Look at the next branch of a frame; True if its approach is free."""
+        row = int(goals.tried[k])
+        goals.tried[k] += 1
+        way = self._approach.of(self.T[k], self.Q[row])
+        if way is None or (len(way) > 1 and not self._approach.is_free(way)):
+            return False
+        goals.q.append(way[0])
+        goals.frame.append(k)
+        return True
+
+    def _connect(self, q: FloatArray, goals: _Goals) -> Connection:
+        scene = self.scene
+        order = np.argsort(goals.frame, kind="stable")
+        Q = np.array(goals.q).reshape(-1, scene.robot.dof)[order]
+        planner = Planner(scene.motions, ROADMAP_PLANNER)
+        frame = np.array(goals.frame, np.int64)[order]
+        seed = scene.loaded.cell.seed
+        return connect(q, Q, frame, planner, attempts=ATTEMPTS, seed=seed)
+
+    def _score(self, connection: Connection) -> PoseScore:
+        sample = self._sample
+        length = np.full(len(self.T), np.inf)
+        roadmap = connection.roadmap
+        to_goals = roadmap.shortest_paths().length_rad[1 : len(roadmap.frame) + 1]
+        np.minimum.at(length, roadmap.frame, to_goals)
+        found = np.isfinite(length)
+        return PoseScore(
+            score=100.0 * float(sample.weight @ found),
+            worst_point=100.0 * sample.worst_point(found),
+            reachable_share=100.0 * float(sample.share @ self._has_ik),
+            path_length_rad=(
+                float(np.average(length[found], weights=sample.share[found]))
+                if found.any()
+                else np.inf
+            ),
+        )
+
+
+@dataclass(slots=True, kw_only=True, eq=False)
+class _Goals:
+    """Pre-grasps found so far.
+
+    Attributes
+    ----------
+    q : list of array, shape (dof,)
+    frame : list of int
+        Frame of each.
+    tried : int array, shape (frames,)
+        Next row of the branches for each frame.
+    bound : float
+        What the frames count for that have a goal or were not looked at [percent].
+    """
+
+    tried: IntArray
+    bound: float
+    q: list[FloatArray] = field(default_factory=list)
+    frame: list[int] = field(default_factory=list)
+
+    def copy(self) -> _Goals:
+        return _Goals(
+            tried=self.tried.copy(),
+            bound=self.bound,
+            q=list(self.q),
+            frame=list(self.frame),
+        )

@@ -1,0 +1,1 @@
+"""Bin poses scored from the workspace map alone."""

@@ -1,0 +1,109 @@
+"""What is asked of a placement, and what can be said of single poses."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from reachmap._typing import BoolArray, FloatArray
+from reachmap.core.collision.bin_fit import BinFit
+from reachmap.core.scene import Scene
+from reachmap.geometry import yaw_transform
+from reachmap.maps.records import WorkspaceMap
+from reachmap.placement.mapped.candidates import Candidate
+from reachmap.placement.mapped.evaluator import Evaluator
+from reachmap.placement.mapped.exact import ALWAYS, Pose
+from reachmap.placement.mapped.imaging import imaging_configurations
+from reachmap.placement.predicted.places import best_at_each_place, pose_grid
+from reachmap.placement.predicted.prediction import field_of, footprint_of, predict
+from reachmap.placement.predicted.region import Region
+
+if TYPE_CHECKING:
+    from reachmap.cell.loading import LoadedCell
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Question:
+    """What is asked: a cell, its workspace map, and where the bin may stand.
+
+    Attributes
+    ----------
+    loaded : LoadedCell
+    workspace : WorkspaceMap
+    is_open : bool array, shape (layers, y, x, orientations)
+        See :func:`reachmap.placement.mapped.sample.open_frames`.
+    region : Region
+    scene : Scene
+        Without the bin.
+    moving : Scene
+        With a bin that can be moved, to look at one pose after the other.
+    keep_scan : bool
+        Whether the cell's own scan configuration stays.
+    fit : BinFit
+        With the arm at the scan configuration if that stays, else without the arm.
+    evaluator : Evaluator
+    """
+
+    loaded: LoadedCell
+    workspace: WorkspaceMap
+    is_open: BoolArray
+    region: Region
+    scene: Scene
+    moving: Scene
+    keep_scan: bool
+    fit: BinFit
+    evaluator: Evaluator
+
+    @property
+    def different_place_m(self) -> float:
+        """Distance of centres from which two bins stand in different places."""
+        return max(self.loaded.cell.bin.inner[:2]) / 2
+
+    def reason_against(self, pose: Pose) -> str:
+        """Why the bin cannot stand at a pose, or ""."""
+        outside = self.region.outside(np.array(pose))
+        if outside:
+            return f"{outside} is outside the region"
+        contact = self.fit.contact(yaw_transform(*pose))
+        return "" if contact is None else contact.reason
+
+    def can_be_imaged(self, pose: Pose) -> bool:
+        """Whether some scan configuration, or the one that stays, images the bin."""
+        if self.keep_scan:
+            return True
+        changed = self.loaded.with_changes(bin_pose=yaw_transform(*pose))
+        found = imaging_configurations(self.moving.with_bin_of(changed))
+        return next(found, None) is not None
+
+    @property
+    def start(self) -> FloatArray | None:
+        """Scan configuration that poses are mapped from, None if it is chosen later."""
+        return self.scene.scan_configuration if self.keep_scan else None
+
+    def exact(
+        self, poses: Sequence[Pose], *, above: float | Sequence[float] = ALWAYS
+    ) -> list[Candidate]:
+        """Map poses with the bin in the scene.
+
+        Poses whose bound is not above a score are left out; those without a scan
+        configuration come with the reason.
+        """
+        found = self.evaluator.evaluate(poses, self.start, above=above)
+        return [
+            Candidate(
+                pose=pose, score=e.score, exact=e.score is not None, reason=e.reason
+            )
+            for pose, e in zip(poses, found, strict=True)
+            if e.score is not None or e.reason
+        ]
+
+    def predicted(self) -> list[Candidate]:
+        """Best pose at each place, by interpolation of the map."""
+        workspace = self.workspace
+        grid = pose_grid(self.region, workspace.x, workspace.y, workspace.z)
+        footprint = footprint_of(self.loaded.cell, self.is_open)
+        prediction = predict(field_of(workspace), footprint, grid)
+        return list(best_at_each_place(prediction, self.reason_against))

@@ -1,0 +1,1 @@
+"""Pictures of the cell itself: a rasterised 3-D view."""

@@ -1,0 +1,1 @@
+"""What a ranking gives back: ordered lists, explanations, files."""

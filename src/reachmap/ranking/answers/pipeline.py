@@ -1,0 +1,93 @@
+"""One grasp list through one ranker: placed, matched, ranked."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from reachmap import __version__
+from reachmap._typing import FloatArray
+from reachmap.errors import SettingsError
+from reachmap.geometry import rotation_from_quaternion_wxyz, transform_from_parts
+from reachmap.ranking.answers.ranked_list import RankedList
+from reachmap.ranking.lists.arrays import GraspList
+from reachmap.ranking.lookup.frames import place_grasps
+from reachmap.ranking.lookup.queries import queries_from_arrays
+from reachmap.ranking.lookup.ranker import Ranker
+from reachmap.ranking.lookup.settings import RankSettings
+from reachmap.ranking.lookup.table import TERMS
+
+
+def rank_list(
+    grasps: GraspList,
+    ranker: Ranker,
+    *,
+    settings: RankSettings | None = None,
+    T_base_frame: FloatArray | None = None,
+) -> RankedList:
+    """Rank a grasp list.
+
+    Parameters
+    ----------
+    grasps : GraspList
+    ranker : Ranker
+    settings : RankSettings, optional
+    T_base_frame : array, shape (4, 4), optional
+        Pose of the list's frame in robot_base, where the cell does not know it.
+
+    Raises
+    ------
+    GraspListError
+        The list is in an unknown frame.
+    """
+    settings = settings or RankSettings()
+    axis = ranker.table.approach_axis
+    placed = place_grasps(grasps, ranker.frames, axis, T_base_frame)
+    queries = queries_from_arrays(
+        ranker.table,
+        placed.points,
+        placed.directions,
+        placed.rotations,
+        roll=settings.roll,
+    )
+    return RankedList(
+        grasps=grasps,
+        queries=queries,
+        ranking=ranker.rank_queries(queries, settings, grasps.scores),
+        settings=_header(ranker, settings),
+        with_likeness=settings.likeness > 0,
+    )
+
+
+def _header(ranker: Ranker, settings: RankSettings) -> Mapping[str, Any]:
+    maxima = dict(zip(TERMS, ranker.table.maxima.tolist(), strict=True))
+    return {
+        "version": __version__,
+        "map_sha256": ranker.stamp.content_sha256,
+        "cell_sha256": ranker.stamp.cell_sha256,
+        "weights": list(settings.weights),
+        "likeness": settings.likeness,
+        "neighbours": settings.neighbours,
+        "roll": settings.roll,
+        "maxima": maxima,
+    }
+
+
+def pose_from_numbers(values: Sequence[float]) -> FloatArray:
+    """Pose of x, y, z [m] and a unit quaternion qw, qx, qy, qz, shape (4, 4).
+
+    Raises
+    ------
+    SettingsError
+        There are not seven numbers, or the quaternion is none.
+    """
+    pose = np.asarray(values, float)
+    norm = float(np.linalg.norm(pose[3:])) if pose.shape == (7,) else np.nan
+    if not (np.isfinite(pose).all() and abs(norm - 1.0) < 1e-2):
+        raise SettingsError(
+            "a frame pose is x y z [m] and a unit quaternion qw qx qy qz "
+            f"(got {pose.tolist()})"
+        )
+    return transform_from_parts(rotation_from_quaternion_wxyz(pose[3:]), pose[:3])

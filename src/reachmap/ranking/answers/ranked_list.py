@@ -1,0 +1,187 @@
+"""The ranked grasp list: the same document, re-ordered, each grasp with its reason."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from reachmap._typing import FloatArray
+from reachmap.maps.records import Status
+from reachmap.ranking.lists.arrays import GraspList
+from reachmap.ranking.lookup.matching import Queries
+from reachmap.ranking.lookup.order import OUTSIDE_MAP, Ranking
+from reachmap.ranking.lookup.table import TERMS
+
+TERM_NAMES = (*TERMS, "likeness")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RankedList:
+    """A grasp list with its ranking.
+
+    Attributes
+    ----------
+    grasps : GraspList
+    queries : Queries
+        The grasps in robot_base, as they were matched.
+    ranking : Ranking
+        Rows in supplied order.
+    settings : mapping
+        What it was ranked with; written to the document.
+    with_likeness : bool
+        Whether the likeness term takes part in the cost.
+    """
+
+    grasps: GraspList
+    queries: Queries
+    ranking: Ranking
+    settings: Mapping[str, Any]
+    with_likeness: bool = False
+
+    def counts(self) -> dict[str, int]:
+        """How many grasps ended in which status, most frequent first."""
+        codes, numbers = np.unique(self.ranking.status, return_counts=True)
+        found = {status_name(c): int(n) for c, n in zip(codes, numbers, strict=True)}
+        return dict(sorted(found.items(), key=lambda item: (-item[1], item[0])))
+
+
+def status_name(code: int) -> str:
+    """Name of a status code as files have it, ``path_found`` for one."""
+    return "outside_map" if code == OUTSIDE_MAP else Status(int(code)).name.lower()
+
+
+def quadrant_ranks(
+    order: Iterable[int], quadrants: tuple[str | None, ...]
+) -> list[int | None]:
+    """Rank of each grasp among those of its quadrant, from 1, in supplied order."""
+    seen: dict[str, int] = {}
+    ranks: list[int | None] = [None] * len(quadrants)
+    for row in order:
+        quadrant = quadrants[row]
+        if quadrant is not None:
+            seen[quadrant] = ranks[row] = seen.get(quadrant, 0) + 1
+    return ranks
+
+
+def ranked_document(ranked: RankedList, top: int | None = None) -> dict[str, Any]:
+    """Build the document with its grasps re-ordered by cost.
+
+    Every object keeps what it held and gains an object ``reachmap``. What an earlier
+    ranking said is replaced.
+
+    Parameters
+    ----------
+    ranked : RankedList
+    top : int, optional
+        Keep only so many of the best.
+    """
+    document = dict(ranked.grasps.document)
+    supplied = document.pop("grasps")
+    order = ranked.ranking.order[:top].tolist()
+    results = _results(ranked)
+    document["reachmap"] = {**ranked.settings, "counts": ranked.counts()}
+    document["grasps"] = [{**supplied[row], "reachmap": results[row]} for row in order]
+    return document
+
+
+def document_text(document: Mapping[str, Any]) -> str:
+    """Return JSON text with one grasp a line."""
+    header = {key: value for key, value in document.items() if key != "grasps"}
+    lines = [f"{_json(key)}: {_json(value)}" for key, value in header.items()]
+    grasps = ",\n  ".join(_json(grasp) for grasp in document["grasps"])
+    lines.append(f'"grasps": [\n  {grasps}\n ]' if grasps else '"grasps": []')
+    return "{\n " + ",\n ".join(lines) + "\n}\n"
+
+
+def _json(value: Any) -> str:
+    # ASCII: text from elsewhere may hold halves of characters, which UTF-8 cannot.
+    return json.dumps(value, allow_nan=False)
+
+
+def _results(ranked: RankedList) -> list[dict[str, Any]]:
+    """Build the ``reachmap`` object of each grasp, in supplied order."""
+    ranking, quadrants = ranked.ranking, ranked.grasps.quadrants
+    after = quadrant_ranks(ranking.order.tolist(), quadrants)
+    before = quadrant_ranks(range(len(quadrants)), quadrants)
+    columns = zip(
+        ranking.rank.tolist(),
+        after,
+        before,
+        ranking.cost.tolist(),
+        ranking.terms.tolist(),
+        ranking.status.tolist(),
+        ranking.test_grasp.tolist(),
+        ranking.distance.tolist(),
+        ranking.angle.tolist(),
+        ranking.orientation_wxyz.tolist(),
+        strict=True,
+    )
+    count = 4 if ranked.with_likeness else 3
+    return [_result(row, count, values) for row, values in enumerate(columns, start=1)]
+
+
+def _result(supplied: int, count: int, values: tuple[Any, ...]) -> dict[str, Any]:
+    rank, after, before, cost, terms, code, test_grasp, phi1, phi2, wxyz = values
+    reachable = bool(np.isfinite(cost))
+    inside = code != OUTSIDE_MAP
+    quadrant = {"quadrant_rank": after, "original_quadrant_rank": before}
+    named = dict(zip(TERM_NAMES[:count], terms[:count], strict=True))
+    return {
+        "rank": rank,
+        "original_rank": supplied,
+        **(quadrant if after is not None else {}),
+        "cost": cost if reachable else None,
+        "terms": named if reachable else None,
+        "status": status_name(code),
+        "test_grasp": test_grasp[1:] if inside else None,
+        "layer": test_grasp[0] if inside else None,
+        "distance": phi1,
+        "angle": phi2,
+        "orientation_wxyz": wxyz if reachable else None,
+    }
+
+
+QUADRANT_ORDER = ("NW", "NE", "SW", "SE", None)
+
+
+def cost_groups(
+    ranked: Sequence[RankedList],
+) -> dict[str, tuple[FloatArray, FloatArray]]:
+    """Terms of J of each quadrant, or of each list that names none.
+
+    Parameters
+    ----------
+    ranked : sequence of RankedList
+
+    Returns
+    -------
+    dict
+        From label to the terms in supplied order and in ranked order, shape (n, 3),
+        or (n, 4) with likeness; a row of NaN is an unreachable grasp.
+    """
+    groups = {}
+    for one in ranked:
+        terms = one.ranking.terms[:, : 4 if one.with_likeness else 3]
+        for label, rows in _rows(one, several=len(ranked) > 1).items():
+            order = one.ranking.order
+            best_first = order[np.isin(order, rows)]
+            groups[label] = (terms[rows], terms[best_first])
+    return groups
+
+
+def _rows(one: RankedList, *, several: bool) -> dict[str, list[int]]:
+    """Rows of each quadrant; of the whole list if it names none."""
+    name = Path(one.grasps.source).stem if several else ""
+    quadrants = one.grasps.quadrants
+    if not any(quadrants):
+        return {name or "all": list(range(len(quadrants)))} if quadrants else {}
+    return {
+        f"{name} {quadrant or 'other'}".strip(): rows
+        for quadrant in QUADRANT_ORDER
+        if (rows := [row for row, own in enumerate(quadrants) if own == quadrant])
+    }

@@ -1,0 +1,1 @@
+"""Grasp lists: reading, checking, importing from other formats."""

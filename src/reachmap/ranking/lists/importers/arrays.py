@@ -1,0 +1,179 @@
+"""Arrays of grasps, one a row: GraspNet's 17 columns and suction's 7."""
+
+from __future__ import annotations
+
+import ast
+import io
+import math
+import re
+import zipfile
+from typing import Any, Final
+
+import numpy as np
+
+from reachmap._typing import FloatArray
+from reachmap.errors import GraspListError
+from reachmap.ranking.lists.document import MAX_GRASPS
+
+UNIT_TOLERANCE: Final = 1e-2
+MAX_NPZ_BYTES: Final = 32 * 2**20
+GRASPNET_COLUMNS: Final = 17
+SUCTION_COLUMNS: Final = 7
+MAX_VALUE: Final = 1e9
+_NPY_START: Final = re.compile(rb"\x93NUMPY(?P<version>[\x01\x02])\x00", re.DOTALL)
+_NUMBERS: Final = re.compile(r"[<>|](f[48]|[iu][1248])")
+
+
+def array_from_npy(data: bytes, source: str) -> FloatArray:
+    """Rows of a ``.npy`` file.
+
+    The header is read here rather than by :func:`numpy.load`: nothing is unpickled,
+    and the size is compared with the file before anything is allocated.
+
+    Parameters
+    ----------
+    data : bytes
+    source : str
+        Name of the file in messages.
+
+    Returns
+    -------
+    array, shape (n, columns)
+        A single row may be stored flat.
+    """
+    match = _NPY_START.match(data)
+    width = {1: 2, 2: 4}.get(match["version"][0], 0) if match else 0
+    start = 8 + width
+    size = int.from_bytes(data[8:start], "little")
+    try:
+        header = ast.literal_eval(data[start : start + min(size, 4096)].decode("ascii"))
+        descr, columns_first = str(header["descr"]), bool(header["fortran_order"])
+        shape = tuple(int(n) for n in header["shape"])
+    except (ValueError, SyntaxError, TypeError, KeyError, MemoryError, RecursionError):
+        raise GraspListError(f"{source}: not a readable .npy file") from None
+    body = data[start + size :]
+    if not _NUMBERS.fullmatch(descr) or len(body) != math.prod(shape) * int(descr[2:]):
+        raise GraspListError(
+            f"{source}: expected a complete array of numbers "
+            f"(got {descr!a} {shape} in {len(data)} bytes)"
+        )
+    flat = np.frombuffer(body, dtype=descr).astype(float)
+    by_rows = flat.reshape(shape[::-1]).T if columns_first else flat.reshape(shape)
+    return _checked(np.atleast_2d(by_rows), source)
+
+
+def array_from_npz(data: bytes, source: str) -> FloatArray:
+    """Return the one array with 17 or 7 columns in an ``.npz`` file."""
+    try:
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            members = [m for m in archive.infolist() if m.filename.endswith(".npy")]
+            if sum(member.file_size for member in members) > MAX_NPZ_BYTES:
+                raise GraspListError(
+                    f"{source}: more than {MAX_NPZ_BYTES} bytes inside"
+                )
+            contents = {m.filename[:-4]: archive.read(m) for m in members}
+    except (zipfile.BadZipFile, OSError, RuntimeError, NotImplementedError,
+            EOFError, ValueError) as error:  # fmt: skip
+        raise GraspListError(f"{source}: not a readable .npz file: {error}") from None
+    found: dict[str, FloatArray] = {}
+    mistakes: list[str] = []
+    for name, content in contents.items():
+        try:
+            found[name] = array_from_npy(content, f"{source}, array {name!a}")
+        except GraspListError as error:
+            mistakes += error.lines
+    if len(found) == 1:
+        return next(iter(found.values()))
+    if not found and mistakes:
+        raise GraspListError(mistakes[:20])
+    raise GraspListError(
+        f"{source}: expected one array with {GRASPNET_COLUMNS} or {SUCTION_COLUMNS} "
+        f"columns (got {len(found)} among {sorted(contents)[:10]})"
+    )
+
+
+def _checked(rows: FloatArray, source: str) -> FloatArray:
+    if rows.ndim != 2 or rows.shape[1] not in (GRASPNET_COLUMNS, SUCTION_COLUMNS):
+        raise GraspListError(
+            f"{source}: expected {GRASPNET_COLUMNS} columns (GraspNet) or "
+            f"{SUCTION_COLUMNS} (suction); the array has the shape {rows.shape}"
+        )
+    if len(rows) > MAX_GRASPS:
+        raise GraspListError(f"{source}: {len(rows)} rows; the limit is {MAX_GRASPS}")
+    # The comparison is false for NaN as well.
+    bad = np.flatnonzero(~(np.abs(rows) < MAX_VALUE).all(axis=1))
+    if bad.size:
+        raise GraspListError(
+            f"{source}: {bad.size} rows hold NaN, infinity or numbers beyond "
+            f"{MAX_VALUE:g}; the first is row {bad[0]}"
+        )
+    return rows
+
+
+def document_from_graspnet(rows: FloatArray, source: str) -> dict[str, Any]:
+    """GraspNet-1Billion and AnyGrasp rows.
+
+    Columns: score, width, height, depth, rotation matrix by rows (9), grasp centre
+    (3), object. The approach axis is the gripper's +x, the first column of the
+    matrix; the position is the grasp centre, from which the fingers reach ``depth``
+    further along the approach.
+    """
+    if rows.shape[1] != GRASPNET_COLUMNS:
+        raise GraspListError(f"{source}: GraspNet has 17 columns (got {rows.shape[1]})")
+    grasps = [
+        {
+            "position": row[13:16],
+            "rotation_matrix": [row[4:7], row[7:10], row[10:13]],
+            "score": row[0],
+            "width": row[1],
+            "object_id": int(row[16]),
+            "x_height": row[2],
+            "x_depth": row[3],
+        }
+        for row in rows.tolist()
+    ]
+    return {"approach_axis": "+x", "grasps": grasps}
+
+
+def document_from_suction(
+    rows: FloatArray, source: str, order: str = "auto"
+) -> dict[str, Any]:
+    """Suction rows: score, then normal and point in either order.
+
+    SuctionNet-1Billion writes the normal before the point; others write the point
+    first. The normal is the triple that has unit length in every row. It points out
+    of the surface, against the approach.
+
+    Parameters
+    ----------
+    rows : array, shape (n, 7)
+    source : str
+    order : {"auto", "normal-first", "point-first"}
+    """
+    if rows.shape[1] != SUCTION_COLUMNS:
+        raise GraspListError(f"{source}: suction has 7 columns (got {rows.shape[1]})")
+    first, second = rows[:, 1:4], rows[:, 4:7]
+    if order == "auto":
+        order = _suction_order(first, second, source)
+    normals, points = (first, second) if order == "normal-first" else (second, first)
+    grasps = [
+        {"position": point, "direction": normal, "score": score}
+        for point, normal, score in zip(
+            points.tolist(), normals.tolist(), rows[:, 0].tolist(), strict=True
+        )
+    ]
+    return {"direction_convention": "outward_normal", "grasps": grasps}
+
+
+def _suction_order(first: FloatArray, second: FloatArray, source: str) -> str:
+    unit = [
+        bool(np.all(np.abs(np.linalg.norm(triple, axis=1) - 1.0) < UNIT_TOLERANCE))
+        for triple in (first, second)
+    ]
+    if unit[0] != unit[1]:
+        return "normal-first" if unit[0] else "point-first"
+    state = "both of" if unit[0] else "neither of"
+    raise GraspListError(
+        f"{source}: {state} the columns 1–3 and 4–6 are unit normals in every row; say "
+        "which are with --from suction-normal-first or --from suction-point-first"
+    )

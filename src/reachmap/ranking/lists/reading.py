@@ -1,0 +1,161 @@
+"""Grasp lists: found, read and checked, with every mistake named."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Final
+
+from reachmap.errors import GraspListError, SettingsError
+from reachmap.ranking.lists.arrays import GraspList, arrays_from_document
+from reachmap.ranking.lists.document import FORMAT, check_document
+from reachmap.ranking.lists.fields import shown
+from reachmap.ranking.lists.importers import FORMATS, NATIVE, document_from_bytes
+from reachmap.ranking.lists.json_text import JsonPath, dotted, limited, lines_of
+
+STDIN: Final = "-"
+MAX_BYTES: Final = 32 * 2**20
+
+
+def read_grasps(
+    path: str | Path,
+    *,
+    source_format: str | None = None,
+    frame: str | None = None,
+    approach_axis: str | None = None,
+) -> GraspList:
+    """Read a grasp list in any known format.
+
+    Parameters
+    ----------
+    path : str or Path
+        A file, or ``-`` for standard input.
+    source_format : str, optional
+        One of :data:`reachmap.ranking.lists.importers.FORMATS`; the content decides by
+        default.
+    frame : str, optional
+        Frame of an imported list; native documents name their own.
+    approach_axis : str, optional
+        Approach axis of an imported list's orientations, instead of its format's.
+
+    Raises
+    ------
+    GraspListError
+        The file cannot be read, or it holds mistakes: one line each.
+    """
+    source = "standard input" if str(path) == STDIN else str(path)
+    if source_format is not None and source_format not in FORMATS:
+        raise SettingsError(f"unknown format {source_format!r}: {', '.join(FORMATS)}")
+    data = _read_bytes(path, source)
+    document, name, text, notes = document_from_bytes(data, source, source_format)
+    if name == NATIVE:
+        _refuse_overrides(document, frame, approach_axis, source)
+    else:
+        document = _imported(document, name, source, frame, approach_axis)
+    return grasps_from_document(document, source=source, text=text, notes=notes)
+
+
+def grasps_from_document(
+    document: Any,
+    *,
+    source: str = "grasps",
+    text: str = "",
+    notes: Sequence[str] = (),
+) -> GraspList:
+    """Check a native document and convert it to arrays.
+
+    Parameters
+    ----------
+    document : object
+        A parsed ``reachmap.grasps`` 1.x document.
+    source : str
+        Name in messages.
+    text : str
+        The JSON text, for line numbers in messages.
+    notes : sequence of str
+        Warnings to carry on.
+
+    Raises
+    ------
+    GraspListError
+        Every mistake on a line of its own.
+    """
+    found = check_document(document)
+    if found.mistakes:
+        raise GraspListError(limited(_located(found.mistakes, source, text)))
+    doubts = limited(_located(found.doubts, source, text))
+    prefix = f"{source}: "
+    warnings = [*(prefix + note for note in notes), *doubts]
+    return arrays_from_document(_without_results(document), source, warnings)
+
+
+def _read_bytes(path: str | Path, source: str) -> bytes:
+    try:
+        if str(path) == STDIN:
+            data = sys.stdin.buffer.read(MAX_BYTES + 1)
+        else:
+            with Path(path).open("rb") as stream:
+                data = stream.read(MAX_BYTES + 1)
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise GraspListError(f"{source}: cannot be read: {reason}") from None
+    if len(data) > MAX_BYTES:
+        raise GraspListError(f"{source}: larger than {MAX_BYTES // 2**20} MiB")
+    return data
+
+
+def _refuse_overrides(
+    document: Any, frame: str | None, approach_axis: str | None, source: str
+) -> None:
+    # What is no such document, or lacks its frame, is reported when it is checked.
+    own = document if isinstance(document, dict) else {}
+    stated = (
+        ("frame", own.get("frame", frame), frame),
+        ("approach_axis", own.get("approach_axis", "+z"), approach_axis),
+    )
+    for name, value, wanted in stated:
+        if wanted is not None and value != wanted:
+            raise SettingsError(
+                f"{source}: a {FORMAT} document states its own {name} "
+                f"({shown(value)}); {wanted} is for imported lists"
+            )
+
+
+def _imported(
+    document: dict[str, Any],
+    name: str,
+    source: str,
+    frame: str | None,
+    approach_axis: str | None,
+) -> dict[str, Any]:
+    if frame is None:
+        raise GraspListError(
+            f"{source}: a list of the format {name} does not name a frame of the cell: "
+            "say with --frame which one its poses are in (bin, robot_base, world, …)"
+        )
+    if approach_axis is not None and "approach_axis" in document:
+        document = {**document, "approach_axis": approach_axis}
+    header = {"format": FORMAT, "format_version": "1.0", "frame": frame}
+    origin = {**document.get("source", {}), "imported_from": name}
+    return {**header, **document, "source": origin}
+
+
+def _located(
+    problems: Sequence[tuple[JsonPath, str]], source: str, text: str
+) -> list[str]:
+    lines = lines_of(text, (path for path, _ in problems[:50])) if text else {}
+    located = []
+    for path, message in problems:
+        where = f"{source}:{lines[path]}" if path in lines else source
+        located.append(f"{where}: {dotted(path)}: {message}")
+    return located
+
+
+def _without_results(document: dict[str, Any]) -> dict[str, Any]:
+    clean = {key: value for key, value in document.items() if key != "reachmap"}
+    clean["grasps"] = [
+        {key: value for key, value in grasp.items() if key != "reachmap"}
+        for grasp in document["grasps"]
+    ]
+    return clean

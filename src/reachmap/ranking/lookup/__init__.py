@@ -1,0 +1,1 @@
+"""The look-up: nearest test grasp, cost J, order."""

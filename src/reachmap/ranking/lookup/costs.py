@@ -1,0 +1,138 @@
+"""The cost J: terms of the test grasp, blending, likeness, and where it is undefined.
+
+J = α φ3 + β φ4 + δ φ5 + ε φ6, with φ3, φ4, φ5 the mean path length, planning time and
+execution time of the test grasp, each divided by its maximum over the path-reachable
+test grasps of the map, and φ6 how unlike its test grasp the grasp is.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from reachmap._typing import BoolArray, FloatArray, IntArray
+from reachmap.ranking.lookup.matching import (
+    TIED_POINTS,
+    Matches,
+    NearestPoints,
+    Queries,
+    match_at,
+    worth_of,
+)
+from reachmap.ranking.lookup.table import GraspTable
+
+# Beyond half a grid diagonal sideways, and so far above or below the layers: grasp
+# points of a heap lie centimetres above and below the height that stands for them.
+SIDEWAYS_TOLERANCE_M: Final = 1e-3
+VERTICAL_TOLERANCE_M: Final = 0.05
+BOTTOM_TOLERANCE_M: Final = 5e-3
+MIN_DISTANCE_M: Final = 1e-6
+
+
+def grasp_costs(table: GraspTable, weights: tuple[float, float, float]) -> FloatArray:
+    """J without likeness of every test grasp, inf where unreachable.
+
+    Returns
+    -------
+    array, shape (points, orientations)
+    """
+    cost = table.normalised @ np.asarray(weights, float)
+    return np.where(table.reachable, cost, np.inf)
+
+
+def outside_map(points: FloatArray, nearest: IntArray, table: GraspTable) -> BoolArray:
+    """Which grasps the map says nothing about, shape (n,).
+
+    A grasp is outside when it is sideways of its nearest test point by more than half
+    a grid diagonal and a millimetre, or below the lowest or above the highest layer by
+    more than 5 cm (half the distance of the layers, if that is more), or more than
+    5 mm below the bin's bottom.
+
+    Parameters
+    ----------
+    points : array, shape (n, 3)
+        In robot_base [m].
+    nearest : int array, shape (n,)
+        Nearest test points.
+    table : GraspTable
+    """
+    p = points @ table.T_bin_base[:3, :3].T + table.T_bin_base[:3, 3]
+    sideways = np.hypot(*(p - table.bin_points[nearest])[:, :2].T)
+    reach = 0.5 * float(np.hypot(*table.pitch)) + SIDEWAYS_TOLERANCE_M
+    step = float(np.diff(table.layers).max(initial=0.0))
+    margin = max(0.5 * step, VERTICAL_TOLERANCE_M)
+    low = max(float(table.layers[0]) - margin, -BOTTOM_TOLERANCE_M)
+    high = float(table.layers[-1]) + margin
+    return np.asarray((sideways > reach) | (p[:, 2] < low) | (p[:, 2] > high))
+
+
+def likeness_terms(matches: Matches, free: BoolArray, table: GraspTable) -> FloatArray:
+    """φ6: how unlike its test grasp a grasp is, shape (n,).
+
+    φ6 = ½ (φ1 / h + φ2 / ω), where h is the larger pitch of the grid and ω the
+    greatest angle between neighbouring orientations of the map (of approach axes where
+    the roll is free). 0 on a test grasp, about 1 a whole step away in both.
+    """
+    h = float(table.pitch.max())
+    spacing = np.where(free, table.spacing_rad[0], table.spacing_rad[1])
+    return np.asarray(0.5 * (matches.distance / h + matches.angle / spacing))
+
+
+def blended_terms(
+    phi: FloatArray,
+    queries: Queries,
+    matches: Matches,
+    table: GraspTable,
+    tree: NearestPoints,
+    table_cost: FloatArray,
+    neighbours: int,
+) -> FloatArray:
+    """φ3, φ4, φ5 blended over the k nearest test points by inverse distance.
+
+    Whether a grasp is reachable is still decided by its nearest test grasp alone. An
+    unreachable neighbour counts with the greatest cost there is, 1 in each term: were
+    it left out, a grasp would become cheaper when a neighbour is lost.
+
+    Parameters
+    ----------
+    phi : array, shape (n, 3)
+        Terms of the nearest test grasps; NaN where unreachable.
+    queries, matches, table, tree
+        The grasps, their nearest test grasps, and where to look.
+    table_cost : array, shape (points, orientations)
+    neighbours : int
+
+    Returns
+    -------
+    array, shape (n, 3)
+        NaN where the nearest test grasp is unreachable.
+    """
+    distance, point = _in_order(queries.points, tree, neighbours + 1)
+    weight = 1.0 / np.maximum(matches.distance, MIN_DISTANCE_M)
+    total, blend = weight.copy(), phi * weight[:, None]
+    worth = worth_of(table_cost)
+    # The matched point is one of the nearest; the others follow by distance.
+    used = np.zeros(len(queries), np.int64)
+    for column in range(point.shape[1]):
+        other = (point[:, column] != matches.point) & (used < neighbours - 1)
+        used += other
+        near = match_at(queries, table, point[:, column], distance[:, column], worth)
+        terms = table.normalised[near.point, near.orientation]
+        terms = np.where(np.isnan(terms), 1.0, terms)
+        weight = np.where(other, 1.0 / np.maximum(near.distance, MIN_DISTANCE_M), 0.0)
+        total += weight
+        blend += terms * weight[:, None]
+    return np.asarray(blend / total[:, None])
+
+
+def _in_order(
+    points: FloatArray, tree: NearestPoints, k: int
+) -> tuple[FloatArray, IntArray]:
+    """Nearest points by distance, equal ones in map order, shapes (n, k)."""
+    distance, point = tree.query(points, k + TIED_POINTS)
+    order = np.lexsort((point, np.round(distance, 9)), axis=1)[:, :k]
+    return (
+        np.take_along_axis(distance, order, axis=1),
+        np.take_along_axis(point, order, axis=1),
+    )

@@ -1,0 +1,212 @@
+"""The bin map as the table that ranking looks things up in."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from reachmap._typing import BoolArray, CodeArray, FloatArray, IntArray
+from reachmap.errors import MapFileError
+from reachmap.geometry import (
+    direction_angle,
+    inverse_transform,
+    rotation_from_quaternion_wxyz,
+)
+from reachmap.maps.records import BinMap, Status, freeze
+from reachmap.ranking.lookup.approach import axis_vector
+
+TERMS: Final = ("path_length", "planning_time", "execution_time")
+SAME_AXIS_RAD: Final = 1e-6
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GraspTable:
+    """Test grasps by point and orientation, with the means that J is made of.
+
+    Points are numbered in the order (layer, y, x); n points, m orientations.
+
+    Attributes
+    ----------
+    shape : (int, int, int, int)
+        Layers, rows (y), columns (x), orientations.
+    points : array, shape (n, 3)
+        d_test in robot_base [m].
+    quaternions : array, shape (n, m, 4)
+        R_test in robot_base, wxyz.
+    axes : array, shape (n, m, 3)
+        Approach directions in robot_base.
+    status : uint8 array, shape (n, m)
+        Codes of :class:`Status`. ``path_found`` here means that an attempt found one.
+    blocking_pair : int array, shape (n, m)
+    reachable : bool array, shape (n, m)
+    means : array, shape (n, m, 3)
+        Mean path length [rad], planning time and execution time [s] over the
+        successful attempts; NaN where none was.
+    maxima : array, shape (3,)
+        Greatest of each mean over the path-reachable test grasps.
+    normalised : array, shape (n, m, 3)
+        φ3, φ4, φ5 in [0, 1]; NaN where unreachable.
+    same_everywhere : bool
+        Whether every point has the same orientations, as families give them.
+    layers : array, shape (nl,)
+        Heights in the bin frame [m].
+    bin_points : array, shape (n, 3)
+        The points in the bin frame [m].
+    pitch : array, shape (2,)
+        Spacing of the grid along the bin's x and y [m].
+    spacing_rad : array, shape (2,)
+        Greatest angle from an orientation to its nearest other: of approach axes,
+        of whole orientations.
+    T_bin_base, bin_pose : array, shape (4, 4)
+    approach_axis : str
+    """
+
+    shape: tuple[int, int, int, int]
+    points: FloatArray
+    quaternions: FloatArray
+    axes: FloatArray
+    status: CodeArray
+    blocking_pair: IntArray
+    reachable: BoolArray
+    means: FloatArray
+    maxima: FloatArray
+    normalised: FloatArray
+    same_everywhere: bool
+    layers: FloatArray
+    bin_points: FloatArray
+    pitch: FloatArray
+    spacing_rad: FloatArray
+    T_bin_base: FloatArray
+    bin_pose: FloatArray
+    approach_axis: str
+
+    def __post_init__(self) -> None:
+        freeze(self)
+
+
+def table_from_bin_map(bin_map: BinMap) -> GraspTable:
+    """Arrange a bin map for ranking.
+
+    Parameters
+    ----------
+    bin_map : BinMap
+
+    Raises
+    ------
+    MapFileError
+        The map has no test grasps, or its poses are not finite.
+    """
+    nl, ny, nx, no = shape = bin_map.status.shape
+    n = nl * ny * nx
+    if 0 in shape:
+        raise MapFileError(f"the bin map has no test grasps (shape {shape})")
+    points = bin_map.position.reshape(n, 3)
+    quaternions = _unit_quaternions(bin_map.quaternion_wxyz.reshape(n, no, 4))
+    if not (np.isfinite(points).all() and np.isfinite(bin_map.bin_pose).all()):
+        raise MapFileError("the bin map has poses that are not finite")
+    found = bin_map.path_found.reshape(n, no, -1) > 0
+    reachable: BoolArray = np.any(found, axis=-1)
+    means = _means(bin_map, found)
+    maxima = np.max(means, axis=(0, 1), where=reachable[..., None], initial=0.0)
+    R = rotation_from_quaternion_wxyz(quaternions)
+    axes = R @ axis_vector(bin_map.approach_axis)
+    T_bin_base = inverse_transform(bin_map.bin_pose)
+    return GraspTable(
+        shape=(nl, ny, nx, no),
+        points=points.copy(),
+        quaternions=quaternions,
+        axes=axes,
+        status=_status(bin_map.status.reshape(n, no), reachable),
+        blocking_pair=bin_map.blocking_pair.reshape(n, no).copy(),
+        reachable=reachable,
+        means=means,
+        maxima=maxima,
+        # A term that is zero everywhere costs nothing rather than 0/0.
+        normalised=means / np.where(maxima > 0, maxima, 1.0),
+        same_everywhere=bool(
+            (quaternion_angle(quaternions, quaternions[0]) < 1e-9).all()
+        ),
+        layers=bin_map.layer.copy(),
+        bin_points=points @ T_bin_base[:3, :3].T + T_bin_base[:3, 3],
+        pitch=_pitch(bin_map),
+        spacing_rad=np.array([_axis_spacing(axes), _turn_spacing(quaternions)]),
+        T_bin_base=T_bin_base,
+        bin_pose=bin_map.bin_pose.copy(),
+        approach_axis=bin_map.approach_axis,
+    )
+
+
+def _unit_quaternions(quaternions: FloatArray) -> FloatArray:
+    norm = np.linalg.norm(quaternions, axis=-1, keepdims=True)
+    if not (np.abs(norm - 1.0) < 1e-6).all():
+        raise MapFileError("the bin map has quaternions that are not of unit length")
+    return np.asarray(quaternions / norm)
+
+
+def _means(bin_map: BinMap, found: BoolArray) -> FloatArray:
+    """Means over successful attempts, shape (n, m, 3); NaN where there is none."""
+    values = (bin_map.path_length, bin_map.planning_cpu_time, bin_map.execution_time)
+    stacked = np.stack([value.reshape(found.shape) for value in values], axis=-1)
+    count = found.sum(axis=-1)[..., None]
+    total = np.where(found[..., None], stacked, 0.0).sum(axis=-2)
+    if not np.isfinite(total).all():
+        raise MapFileError("the bin map has a path without length or times")
+    return np.where(count > 0, total / np.maximum(count, 1), np.nan)
+
+
+def _status(status: CodeArray, reachable: BoolArray) -> CodeArray:
+    """Status as ranking sees it: of the attempts, not of the roadmap.
+
+    A test grasp that the roadmap proves reachable but that no attempt reached has no
+    cost; for a picking loop, which runs the planner, it is ``no_path_found``.
+    """
+    unmeasured = (status == Status.PATH_FOUND) & ~reachable
+    seen = np.where(unmeasured, Status.NO_PATH_FOUND, status)
+    return np.asarray(np.where(reachable, Status.PATH_FOUND, seen).astype(np.uint8))
+
+
+def _pitch(bin_map: BinMap) -> FloatArray:
+    """Spacing along x and y; a single row stands for the whole inner side."""
+    sides = zip((bin_map.x, bin_map.y), bin_map.bin_inner[:2], strict=True)
+    return np.array([np.diff(c).max() if c.size > 1 else side for c, side in sides])
+
+
+def _axis_spacing(axes: FloatArray) -> float:
+    """Greatest angle from an approach axis of the first point to its nearest other."""
+    angles = direction_angle(axes[0][:, None], axes[0][None])
+    return _greatest_gap(angles)
+
+
+def _turn_spacing(quaternions: FloatArray) -> float:
+    angles = quaternion_angle(quaternions[0][:, None], quaternions[0][None])
+    return _greatest_gap(angles)
+
+
+def _greatest_gap(angles: FloatArray) -> float:
+    others = np.where(angles > SAME_AXIS_RAD, angles, np.inf).min(axis=1)
+    gap = float(others.max())
+    return gap if np.isfinite(gap) else float(np.pi)
+
+
+def quaternion_angle(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Rotation angle between unit quaternions [rad]: φ2 of Eq. (3).
+
+    Equal to :func:`reachmap.geometry.rotation_angle` of the matrices, for half the
+    arithmetic; the half-angle form keeps full precision near 0 and near π.
+
+    Parameters
+    ----------
+    a, b : array, shape (..., 4)
+
+    Returns
+    -------
+    array, shape (...)
+        In [0, π].
+    """
+    # q and -q are the same rotation: the nearer of the two counts.
+    chord = np.linalg.norm(a - b, axis=-1)
+    total = np.linalg.norm(a + b, axis=-1)
+    return np.asarray(4.0 * np.arctan2(np.minimum(chord, total),
+                                       np.maximum(chord, total)))  # fmt: skip

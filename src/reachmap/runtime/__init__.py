@@ -1,0 +1,1 @@
+"""Units of work: run, kept, resumed, shared out over workers and machines."""

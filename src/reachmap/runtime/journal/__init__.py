@@ -1,0 +1,1 @@
+"""The file that finished units are kept in until the artefact is written."""

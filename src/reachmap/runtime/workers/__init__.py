@@ -1,0 +1,1 @@
+"""Processes that do the units, and what happens when one dies."""

@@ -1,0 +1,224 @@
+"""What every test frame offers a planner: free goals, or the reason there are none."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from reachmap._typing import BoolArray, CodeArray, FloatArray, IntArray
+from reachmap.core.planning.approach import StraightApproach
+from reachmap.core.scene import Scene
+from reachmap.maps.records import NO_PAIR, Status, freeze
+from reachmap.runtime.parallel import compute_units
+from reachmap.runtime.progress import Progress
+from reachmap.sampling.frames import FrameGrid
+
+if TYPE_CHECKING:
+    from reachmap.cell.loading import LoadedCell
+
+MAX_COUNT = 255
+
+
+@dataclass(frozen=True, kw_only=True)  # no slots: it keeps what it works out
+class Survey:
+    """Goals of many test frames.
+
+    Attributes
+    ----------
+    status : uint8 array, shape (frames,)
+        NO_IK, IK_IN_COLLISION or APPROACH_BLOCKED; NOT_ATTEMPTED where there are goals.
+    blocking_pair : int array, shape (frames,)
+        Index into the checker's ``body_pairs``, -1 where there is none.
+    n_ik, n_ik_free : uint8 array, shape (frames,)
+        Different solutions, and those free of collision.
+    frame : int array, shape (goals,)
+        Frame of each goal, rising.
+    way : array, shape (points, dof)
+        Approaches, one after another, each from pre-grasp to grasp [rad]; a single
+        point where there is no approach.
+    way_size : int array, shape (goals,)
+        Points of each.
+    """
+
+    status: CodeArray
+    blocking_pair: IntArray
+    n_ik: CodeArray
+    n_ik_free: CodeArray
+    frame: IntArray
+    way: FloatArray
+    way_size: IntArray
+
+    def __post_init__(self) -> None:
+        freeze(self)
+
+    @cached_property
+    def way_begin(self) -> IntArray:
+        """Row of ``way`` at which each approach begins, shape (goals,)."""
+        return np.asarray(np.cumsum(self.way_size) - self.way_size)
+
+    @cached_property
+    def goals(self) -> FloatArray:
+        """Where plans end: pre-grasp configurations, shape (goals, dof)."""
+        return self.way[self.way_begin]
+
+    def goals_of(self, frame: int) -> IntArray:
+        """Rows of the goals of one frame."""
+        low, high = np.searchsorted(self.frame, [frame, frame + 1])
+        return np.arange(low, high)
+
+    def way_of(self, goal: int) -> FloatArray:
+        """Approach of one goal, shape (n, dof)."""
+        begin = int(self.way_begin[goal])
+        return self.way[begin : begin + int(self.way_size[goal])]
+
+
+def survey_frames(scene: Scene, T_base_tcp: FloatArray, approach_m: float) -> Survey:
+    """Solve and check test frames.
+
+    Parameters
+    ----------
+    scene : Scene
+    T_base_tcp : array, shape (n, 4, 4)
+    approach_m : float
+        Length of the straight approach, 0 for none.
+    """
+    return _Surveyor(scene, T_base_tcp, approach_m).survey()
+
+
+def join_surveys(surveys: Sequence[Survey]) -> Survey:
+    """Put surveys of consecutive frames together."""
+    offsets = np.cumsum([0, *(len(s.status) for s in surveys[:-1])])
+
+    def joined(name: str) -> FloatArray:
+        return np.concatenate([getattr(s, name) for s in surveys])
+
+    return Survey(
+        status=joined("status").astype(np.uint8),
+        blocking_pair=joined("blocking_pair").astype(np.int64),
+        n_ik=joined("n_ik").astype(np.uint8),
+        n_ik_free=joined("n_ik_free").astype(np.uint8),
+        frame=np.concatenate(
+            [s.frame + offset for s, offset in zip(surveys, offsets, strict=True)]
+        ),
+        way=joined("way"),
+        way_size=joined("way_size").astype(np.int64),
+    )
+
+
+class _Surveyor:
+    def __init__(self, scene: Scene, T_base_tcp: FloatArray, approach_m: float) -> None:
+        self._scene, self._T = scene, T_base_tcp
+        self._approach = StraightApproach(
+            scene.kinematics,
+            scene.motions,
+            scene.loaded.cell.robot.tcp.approach_axis,
+            approach_m,
+        )
+        count = len(T_base_tcp)
+        self._status = np.full(count, Status.NO_IK, np.uint8)
+        self._pair = np.full(count, NO_PAIR, np.int64)
+
+    def survey(self) -> Survey:
+        """Solve all frames, then look at each frame's configurations."""
+        count = len(self._T)
+        Q, frame = self._scene.kinematics.solve_many(self._T, windings=False)
+        free = self._scene.checker.free_mask(Q)
+        n_ik = np.bincount(frame, minlength=count)
+        n_free = np.bincount(frame[free], minlength=count)
+        ways: list[FloatArray] = []
+        owners: list[int] = []
+        bounds = np.searchsorted(frame, np.arange(count + 1))
+        for k in np.flatnonzero(n_ik):
+            rows = slice(bounds[k], bounds[k + 1])
+            found = self._goals_of(int(k), Q[rows], free[rows])
+            ways += found
+            owners += [int(k)] * len(found)
+        dof = self._scene.robot.dof
+        return Survey(
+            status=self._status,
+            blocking_pair=self._pair,
+            n_ik=np.minimum(n_ik, MAX_COUNT).astype(np.uint8),
+            n_ik_free=np.minimum(n_free, MAX_COUNT).astype(np.uint8),
+            frame=np.array(owners, np.int64),
+            way=np.vstack(ways) if ways else np.zeros((0, dof)),
+            way_size=np.array([len(way) for way in ways], np.int64),
+        )
+
+    def _goals_of(self, k: int, Q: FloatArray, free: BoolArray) -> list[FloatArray]:
+        """Approaches that a planner may aim at; none means a status with a cause."""
+        if not free.any():
+            self._status[k] = Status.IK_IN_COLLISION
+            self._pair[k] = self._scene.checker.blocking_pair_of_many(Q)
+            return []
+        if self._approach.distance_m == 0:
+            self._status[k] = Status.NOT_ATTEMPTED
+            return [q[None] for q in Q[free]]
+        ways = [
+            w for q in Q[free] if (w := self._approach.of(self._T[k], q)) is not None
+        ]
+        found = [way for way in ways if self._approach.is_free(way)]
+        self._status[k] = Status.NOT_ATTEMPTED if found else Status.APPROACH_BLOCKED
+        if not found:
+            self._pair[k] = next(
+                (p for way in ways if (p := self._approach.blocking_pair(way)) >= 0),
+                NO_PAIR,
+            )
+        return found
+
+
+FRAMES_PER_UNIT = 270
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SurveyContext:
+    """What a worker needs for a survey; frames are numbered through the grids."""
+
+    loaded: LoadedCell
+    with_bin: bool
+    grids: tuple[FrameGrid, ...]
+    approach_m: float
+
+    def blocks(self) -> list[tuple[int, slice]]:
+        """Grid and range of frames of each unit."""
+        return [
+            (k, slice(start, min(start + FRAMES_PER_UNIT, grid.size)))
+            for k, grid in enumerate(self.grids)
+            for start in range(0, grid.size, FRAMES_PER_UNIT)
+        ]
+
+
+def run_survey(
+    context: SurveyContext, *, workers: int, executor: str, progress: Progress
+) -> Survey:
+    """Survey all frames; the result does not depend on the number of workers."""
+    frames = sum(grid.size for grid in context.grids)
+    payloads = compute_units(
+        survey_unit,
+        len(context.blocks()),
+        prepare=prepare_survey,
+        context=context,
+        workers=min(workers, max(1, math.ceil(frames / (4 * FRAMES_PER_UNIT)))),
+        executor=executor,
+        progress=progress,
+    )
+    return join_surveys([Survey(**payload) for payload in payloads])
+
+
+def prepare_survey(context: SurveyContext) -> tuple[SurveyContext, Scene]:
+    """Build the scene, once per worker."""
+    return context, Scene.build(context.loaded, with_bin=context.with_bin)
+
+
+def survey_unit(state: tuple[SurveyContext, Scene], unit: int) -> dict[str, Any]:
+    """Survey one block of frames."""
+    context, scene = state
+    grid, block = context.blocks()[unit]
+    T = context.grids[grid].transforms_at(block)
+    survey = survey_frames(scene, T, context.approach_m)
+    return {f.name: getattr(survey, f.name) for f in dataclasses.fields(survey)}

@@ -1,0 +1,182 @@
+"""Damaged files: a clean error or exactly what was written, never anything else."""
+
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from reachmap.errors import MapFileError
+from reachmap.maps import (
+    read_bin_map,
+    read_placement,
+    read_workspace_map,
+    write_bin_map,
+    write_placement,
+    write_workspace_map,
+)
+from reachmap.maps.bytes import integrity
+from reachmap.maps.bytes.integrity import SEAL_BYTES
+from tests.support.map_asserts import assert_records_equal
+from tests.support.synthetic_maps import (
+    synthetic_bin_map,
+    synthetic_placement,
+    synthetic_workspace_map,
+)
+
+Reader = Callable[[Path], Any]
+
+
+@pytest.fixture(scope="module")
+def originals(
+    tmp_path_factory: pytest.TempPathFactory,
+) -> list[tuple[bytes, Any, Reader]]:
+    """Bytes, record and reader of one file of each kind."""
+    path = tmp_path_factory.mktemp("originals") / "file.h5"
+    found = []
+    for record, write, read in (
+        (synthetic_workspace_map(np.full((1, 2, 2), 0.5)), write_workspace_map,
+         read_workspace_map),
+        (synthetic_bin_map(0.5, shape=(1, 2, 2, 2, 2)), write_bin_map, read_bin_map),
+        (synthetic_placement(), write_placement, read_placement),
+    ):  # fmt: skip
+        write(path, record, overwrite=True)  # type: ignore[operator]
+        found.append((path.read_bytes(), read(path), read))  # type: ignore[operator]
+    return found
+
+
+def flip(data: bytearray, rng: np.random.Generator) -> None:
+    """Flip one bit, most of the time where the file is not all zeros."""
+    at = int(rng.integers(len(data)))
+    if rng.random() < 0.7:
+        used = np.flatnonzero(np.frombuffer(data, np.uint8))
+        at = int(rng.choice(used))
+    data[at] ^= 1 << int(rng.integers(8))
+
+
+def truncate(data: bytearray, rng: np.random.Generator) -> None:
+    """Cut the end off, now and then close to it."""
+    most = len(data) if rng.random() < 0.95 else 200
+    del data[len(data) - int(rng.integers(1, most)) :]
+
+
+def blank(data: bytearray, rng: np.random.Generator) -> None:
+    """Overwrite a stretch with zeros, as a lost block is."""
+    at, size = int(rng.integers(len(data))), int(rng.integers(1, 4096))
+    data[at : at + size] = bytes(len(data[at : at + size]))
+
+
+def insert(data: bytearray, rng: np.random.Generator) -> None:
+    """Put foreign bytes in."""
+    at = int(rng.integers(len(data)))
+    data[at:at] = rng.bytes(int(rng.integers(1, 64)))
+
+
+def swap(data: bytearray, rng: np.random.Generator) -> None:
+    """Exchange two stretches."""
+    size = int(rng.integers(1, 512))
+    a, b = np.sort(rng.integers(0, len(data) - size, 2))
+    if b - a >= size:
+        data[a : a + size], data[b : b + size] = (
+            data[b : b + size],
+            data[a : a + size],
+        )
+
+
+MUTATIONS = (flip, truncate, blank, insert, swap)
+
+
+def survive(
+    originals: list[tuple[bytes, Any, Reader]], folder: Path, seeds: range
+) -> Counter[str]:
+    """Damage and read; count how it ends."""
+    path = folder / "damaged.h5"
+    ends: Counter[str] = Counter()
+    for seed in seeds:
+        rng = np.random.default_rng(seed)
+        original, record, read = originals[seed % len(originals)]
+        data = bytearray(original)
+        for _ in range(int(rng.integers(1, 4))):
+            MUTATIONS[int(rng.integers(len(MUTATIONS)))](data, rng)
+        path.write_bytes(data)
+        again = read_or_error(read, path)
+        if isinstance(again, MapFileError):
+            assert str(path) in again.lines[0]
+            ends["refused"] += 1
+        else:
+            assert_records_equal(again, record)
+            ends["identical"] += 1
+    return ends
+
+
+def read_or_error(read: Reader, path: Path) -> Any:
+    """The record, or the one error that is allowed."""
+    try:
+        return read(path)
+    except MapFileError as error:
+        return error
+
+
+def test_320_damaged_files_are_refused_or_identical(
+    originals: list[tuple[bytes, Any, Reader]], tmp_path: Path
+) -> None:
+    """Flipped bits, truncations, lost blocks, insertions, exchanges."""
+    ends = survive(originals, tmp_path, range(320))
+    assert ends["refused"] > 270
+
+
+@pytest.mark.slow
+def test_6000_damaged_files_are_refused_or_identical(
+    originals: list[tuple[bytes, Any, Reader]], tmp_path: Path
+) -> None:
+    """The same, many times over."""
+    ends = survive(originals, tmp_path, range(1000, 7000))
+    assert ends.total() == 6000
+
+
+def test_every_cut_near_the_end_is_refused_or_identical(
+    originals: list[tuple[bytes, Any, Reader]], tmp_path: Path
+) -> None:
+    """Cutting takes the seal first, which is no loss, then the file."""
+    original, record, read = originals[2]
+    path = tmp_path / "cut.h5"
+    for cut in (0, 1, SEAL_BYTES, SEAL_BYTES + 1, 200):
+        path.write_bytes(original[: len(original) - cut])
+        again = read_or_error(read, path)
+        if isinstance(again, MapFileError):
+            assert cut > SEAL_BYTES
+        else:
+            assert_records_equal(again, record)
+
+
+def test_one_flipped_bit_anywhere_breaks_the_seal(
+    originals: list[tuple[bytes, Any, Reader]], tmp_path: Path
+) -> None:
+    """Every byte in front of the seal counts, HDF5 metadata and padding included."""
+    original, _, read = originals[2]
+    path = tmp_path / "flipped.h5"
+    for at in np.linspace(0, len(original) - 90, 40).astype(int):
+        data = bytearray(original)
+        data[at] ^= 0x10
+        path.write_bytes(data)
+        with pytest.raises(
+            MapFileError, match=r"do not match its seal|not an HDF5 file"
+        ):
+            read(path)
+
+
+def test_hdf5_is_given_a_limited_time(
+    originals: list[tuple[bytes, Any, Reader]],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Without a seal the file is tried out elsewhere, and that is not waited for."""
+    original, _, read = originals[2]
+    path = tmp_path / "unsealed.h5"
+    path.write_bytes(original[:-SEAL_BYTES])
+    monkeypatch.setattr(integrity, "TIME_LIMIT_S", 0.0)
+    monkeypatch.setattr(integrity, "SECONDS_PER_BYTE", 0.0)
+    with pytest.raises(MapFileError, match="damaged, HDF5 cannot read it"):
+        read(path)

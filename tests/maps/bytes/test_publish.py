@@ -1,0 +1,124 @@
+"""Files appear whole or not at all, and nothing that stood there is harmed."""
+
+import errno
+import os
+from pathlib import Path
+
+import pytest
+
+from reachmap.errors import EngineError, OutputError
+from reachmap.maps import (
+    check_output,
+    publish,
+    read_placement,
+    write_bin_map,
+    write_placement,
+)
+from tests.support.synthetic_maps import synthetic_bin_map, synthetic_placement
+
+
+def names(folder: Path) -> list[str]:
+    """What a folder holds."""
+    return sorted(item.name for item in folder.iterdir())
+
+
+def test_an_existing_file_is_refused_and_kept(tmp_path: Path) -> None:
+    """Without overwrite the old bytes stay, and the message names the remedy."""
+    path = tmp_path / "p.h5"
+    path.write_bytes(b"mine")
+    with pytest.raises(OutputError, match=r"p\.h5: exists already; --overwrite"):
+        write_placement(path, synthetic_placement())
+    assert path.read_bytes() == b"mine"
+    assert names(tmp_path) == ["p.h5"]
+
+
+def test_overwrite_replaces_it(tmp_path: Path) -> None:
+    """With overwrite the new file takes the place of the old."""
+    path = tmp_path / "p.h5"
+    path.write_bytes(b"mine")
+    write_placement(path, synthetic_placement(), overwrite=True)
+    assert read_placement(path).chosen == 0
+    assert names(tmp_path) == ["p.h5"]
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("missing/p.h5", "the folder .*missing does not exist"),
+        ("folder", "is a folder; name a file"),
+        ("file/p.h5", "cannot be written|does not exist"),
+        ("x" * 300, "cannot be written"),
+    ],
+)
+def test_impossible_places_are_refused(tmp_path: Path, name: str, message: str) -> None:
+    """A missing folder, a folder itself, a file as a folder, a name too long."""
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "file").write_text("")
+    with pytest.raises(OutputError, match=message):
+        write_placement(tmp_path / name, synthetic_placement())
+
+
+def test_a_read_only_folder_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """No permission is said as such (asked of the system, as root may write)."""
+    monkeypatch.setattr(os, "access", lambda *_: False)
+    with pytest.raises(OutputError, match="no permission in"):
+        check_output(tmp_path / "p.h5")
+
+
+@pytest.mark.parametrize("failing", ["write", "fsync", "replace"])
+def test_a_full_disk_leaves_nothing_behind(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, failing: str
+) -> None:
+    """Whichever step fails, the old file stays and no temporary file does."""
+    path = tmp_path / "p.h5"
+    path.write_bytes(b"old")
+
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    def chunks() -> list[bytes]:
+        return [b"new"]
+
+    if failing == "fsync":
+        monkeypatch.setattr(os, "fsync", full)
+    elif failing == "replace":
+        monkeypatch.setattr(Path, "replace", full)
+    data = (full() for _ in chunks()) if failing == "write" else chunks()
+    with pytest.raises(OutputError, match="No space left on device"):
+        publish(path, data, overwrite=True)  # type: ignore[arg-type]
+    assert path.read_bytes() == b"old"
+    assert names(tmp_path) == ["p.h5"]
+
+
+def test_a_file_size_limit_is_a_clean_error(tmp_path: Path) -> None:
+    """The system's own limit, reached while writing for real."""
+    import resource
+
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, hard))
+    try:
+        with pytest.raises(OutputError, match="File too large"):
+            write_bin_map(tmp_path / "b.h5", synthetic_bin_map())
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert names(tmp_path) == []
+
+
+def test_a_link_is_followed(tmp_path: Path) -> None:
+    """A symbolic link keeps pointing; the file behind it is replaced."""
+    target, link = tmp_path / "real.h5", tmp_path / "link.h5"
+    target.write_bytes(b"old")
+    link.symlink_to(target)
+    publish(link, [b"new"], overwrite=True)
+    assert link.is_symlink()
+    assert target.read_bytes() == b"new"
+
+
+def test_a_record_that_breaks_the_format_is_not_written(tmp_path: Path) -> None:
+    """The producer's mistake is named; no file appears."""
+    record = synthetic_placement(score=synthetic_placement().score + 50)
+    with pytest.raises(EngineError, match=r"p\.h5: not written, score goes above 100"):
+        write_placement(tmp_path / "p.h5", record)
+    assert names(tmp_path) == []
