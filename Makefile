@@ -38,8 +38,8 @@ quick: ## The same with fewer test grasps and attempts, into run/quick
 install: $(VENV)/.runtime ## Create the virtual environment and install reachmap
 dev: $(VENV)/.dev ## Add what tests, checks and documentation need
 
-test: $(VENV)/.dev ## Run the default test suite
-	$(BIN)/python -m pytest -n $(JOBS)
+test: $(VENV)/.dev ## Run the default test suite (COVERAGE=yes measures it)
+	$(BIN)/python -m pytest -n $(JOBS) $(if $(COVERAGE),--cov --cov-report=term:skip-covered)
 
 test-slow: $(VENV)/.dev ## Run the tests that take minutes
 	$(BIN)/python -m pytest -n $(JOBS) -m slow --hypothesis-profile=explore

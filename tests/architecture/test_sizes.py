@@ -51,3 +51,19 @@ def test_functions_are_short(path: Path) -> None:
 def test_modules_say_what_they_are(path: Path) -> None:
     """Every module begins with a docstring."""
     assert ast.get_docstring(ast.parse(path.read_text()))
+
+
+ROOMS = 13
+CATALOGUES = {"cli", "tools"}
+
+
+def test_folders_can_be_taken_in_at_a_glance() -> None:
+    """At most 13 modules a folder, but for the two with a file per command."""
+    folders = {path.parent for path in SOURCES}
+    crowded = {
+        str(folder.relative_to(ROOT)): number
+        for folder in folders
+        if folder.name not in CATALOGUES
+        and (number := len(list(folder.glob("[!_]*.py")))) > ROOMS
+    }
+    assert not crowded

@@ -1,0 +1,41 @@
+"""What ``import reachmap`` offers."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import reachmap
+
+
+def test_every_public_name_is_there_and_is_what_its_home_defines() -> None:
+    """A name of ``__all__`` that cannot be imported would fail at its first user."""
+    homes = reachmap._HOMES
+    assert {*homes, "__version__"} == set(reachmap.__all__)
+    for name, home in homes.items():
+        module, _, attribute = home.partition(":")
+        value = getattr(reachmap, name)
+        assert value.__module__.startswith("reachmap."), name
+        defined = getattr(sys.modules[f"reachmap.{module}"], attribute or name)
+        assert value is defined
+    assert set(reachmap.__all__) <= set(dir(reachmap))
+
+
+def test_unknown_names_are_attribute_errors() -> None:
+    """``hasattr`` and ``from reachmap import …`` behave as with any module."""
+    assert not hasattr(reachmap, "no_such_name")
+
+
+def test_importing_the_package_loads_nothing() -> None:
+    """Engines cost seconds; they come with the first name that needs them."""
+    code = (
+        "import sys, reachmap\n"
+        "heavy = {'numpy', 'pinocchio', 'ompl', 'h5py', 'matplotlib', 'pydantic'}\n"
+        "print(sorted(heavy & set(sys.modules)))\n"
+        "reachmap.Ranker\n"
+        "print(sorted(heavy & set(sys.modules) - {'numpy', 'h5py'}))\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], check=True, capture_output=True, text=True
+    )
+    assert done.stdout.splitlines() == ["[]", "[]"]
