@@ -46,6 +46,7 @@ HOMES = {
     "trimesh": ("reachmap.view.",),
     "xacrodoc": ("reachmap.cell.",),
     "ruamel": ("reachmap.cell.text.", "reachmap.ranking.lists."),
+    "simpleeval": ("reachmap.cell.text.expressions",),
     "distributed": ("reachmap.runtime.",),
     "dask": ("reachmap.runtime.",),
 }

@@ -165,10 +165,12 @@ def fingerprint(
     """Sha256 of what a cell *is*, whatever its files are called and where they lie.
 
     File references give way to the sha256 of their bytes; description, package
-    folders and xacro arguments, whose effect is in the URDF text, are left out.
+    folders, parameters and xacro arguments, whose effect is elsewhere, are left out.
     """
     data: dict[str, Any] = json.loads(cell.model_dump_json())
     del data["description"], data["resources"]
+    # The numbers that parameters lead to stand in their places.
+    del data["parameters"], data["expressions"]
     robot = data["robot"]
     del robot["xacro_args"], robot["joint_limits"], robot["group"]
     hashes = {name: f"sha256:{digest}" for name, digest in files_sha256.items()}

@@ -13,6 +13,7 @@ from reachmap.cell.loaded import LoadedCell, fingerprint
 from reachmap.cell.model.cell import Cell
 from reachmap.cell.references import check_names, find_doubts
 from reachmap.cell.resolution import resolved_cell, validated
+from reachmap.cell.text.expressions import resolve_expressions, restore_expressions
 from reachmap.cell.text.messages import did_you_mean
 from reachmap.cell.text.overrides import apply_overrides
 from reachmap.cell.text.yaml_reader import (
@@ -90,7 +91,9 @@ def cell_from_text(
     document = parse_yaml(text, label)
     if not isinstance(document.data, dict):
         raise CellError(f"{label}:1:1: expected a mapping with format: reachmap.cell")
+    restore_expressions(document)
     apply_overrides(document, overrides, Cell)
+    resolve_expressions(document)
     cell = validated(document)
     files = read_files(document, directory)
     if files.robot is not None:
@@ -215,7 +218,9 @@ def stored_cell(
         raise CellError(f"{source}: the cell is not JSON: {error}") from None
     if not isinstance(document.data, dict):
         raise CellError(f"{source}: the cell is not a JSON object")
+    restore_expressions(document)
     apply_overrides(document, changes, Cell)
+    resolve_expressions(document)
     cell = validated(document)
     document.raise_mistakes()
     if cell is None:

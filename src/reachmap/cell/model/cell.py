@@ -15,6 +15,7 @@ from reachmap.cell.model.fields import (
     Positive,
     Record,
 )
+from reachmap.cell.model.parameters import Parameters
 from reachmap.cell.model.planner import PlannerSpec
 from reachmap.cell.model.robot import IkSpec, JointLimits, Resources, RobotSpec, TcpSpec
 from reachmap.cell.model.scans import (
@@ -92,6 +93,17 @@ class Cell(Record):
     )
     name: Identifier = Field(description="Name of the cell.")
     description: str = Field("", max_length=2000, description="One line for people.")
+    parameters: Parameters = Field(
+        {},
+        max_length=100,
+        description="Named numbers. Any number of the cell may be an expression of "
+        'them, as in `"=pedestal_height - 0.402"`.',
+    )
+    expressions: dict[str, str] = Field(
+        {},
+        description="Written by reachmap into resolved cells: the expressions, by the "
+        "place of the number they stand for.",
+    )
     resources: Resources = Field(Resources(), description="Where files are looked up.")
     robot: RobotSpec = Field(description="The arm.")
     camera: CameraSpec | None = Field(

@@ -59,7 +59,13 @@ def _apply(document: Document, text: str, place: Place, model: type[BaseModel]) 
         key = _key(container, part, location, model)
         last = index == len(parts) - 1
         location = (*location, key)
-        if last:
+        if (
+            last
+            and location[:-1] == ("parameters",)
+            and isinstance(container[key], dict)
+        ):
+            container[key] |= {"value": value.data}
+        elif last:
             container[key] = value.data
         elif isinstance(container, dict) and container.get(str(key)) is None:
             container[key] = {}
@@ -99,6 +105,8 @@ def _key(
     if not isinstance(container, dict):
         raise _PathError(f"{where} is a single value (got .{part} after it)")
     known = known_keys(model, location)
+    if location == ("parameters",):
+        known = tuple(container)
     if known and part not in known:
         raise _PathError(f"{where} has no key {part!r}; {did_you_mean(part, known)}")
     return part
