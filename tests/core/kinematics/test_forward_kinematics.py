@@ -120,3 +120,36 @@ def test_pose_errors_lead_to_the_goal(p: list[float], rpy: list[float]) -> None:
     turn = np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * K @ K
     np.testing.assert_allclose(turn @ start[:3, :3], goal[:3, :3], atol=1e-9)
     np.testing.assert_allclose(start[:3, 3] + error[:3], goal[:3, 3], atol=1e-12)
+
+
+@settings(max_examples=100, deadline=None)
+@given(
+    axis=st.tuples(*[st.floats(-1.0, 1.0)] * 3).filter(
+        lambda a: np.linalg.norm(a) > 0.1
+    ),
+    short_of_half_turn=st.sampled_from(
+        [0.0, 1e-15, 1e-9, 1e-6, 1e-3, 0.009, 0.011, 0.5]
+    ),
+    rpy=st.tuples(*[st.floats(-180.0, 180.0)] * 3),
+)
+def test_pose_errors_at_half_turns(
+    axis: tuple[float, ...], short_of_half_turn: float, rpy: tuple[float, ...]
+) -> None:
+    """The rotation vector is as long as the turn, and turns to the goal."""
+    a = np.array(axis) / np.linalg.norm(axis)
+    angle = np.pi - short_of_half_turn
+    K = np.array([[0, -a[2], a[1]], [a[2], 0, -a[0]], [-a[1], a[0], 0]])
+    turn = np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * K @ K
+    start = transform_from_parts(rotation_from_rpy_deg(np.array(rpy)), np.zeros(3))
+    goal = transform_from_parts(turn @ start[:3, :3], np.zeros(3))
+    error = pose_error(goal[None], start[None])[0, 3:]
+    ways = [angle * a, -angle * a] if short_of_half_turn < 1e-12 else [angle * a]
+    assert min(np.abs(error - way).max() for way in ways) < 1e-12
+
+
+@pytest.mark.parametrize("axis", np.eye(3).tolist())
+def test_an_exact_half_turn_about_an_axis_is_no_match(axis: list[float]) -> None:
+    """Tool up is not tool down, though the rotation's sine is zero."""
+    goal = transform_from_parts(2 * np.outer(axis, axis) - np.eye(3), np.zeros(3))
+    error = pose_error(goal[None], np.eye(4)[None])[0, 3:]
+    np.testing.assert_allclose(np.abs(error), np.pi * np.array(axis), atol=1e-15)

@@ -2,33 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Protocol
-
 import numpy as np
 import pinocchio as pin
 
 from reachmap._typing import FloatArray, IntArray
 from reachmap.cell.model.cell import IkSpec
-from reachmap.core.kinematics.analytic import AnalyticSolver, can_use_eaik
 from reachmap.core.kinematics.follow import Follower
-from reachmap.core.kinematics.nominal import NominalSolver, nominal_chain
-from reachmap.core.kinematics.numeric import NumericSolver
-from reachmap.core.kinematics.redundant import RedundantSolver
-from reachmap.core.kinematics.solutions import Rows, within_limits
+from reachmap.core.kinematics.solutions import within_limits
+from reachmap.core.kinematics.solvers.choice import choose_solver
 from reachmap.core.robot.chain import SerialChain
 from reachmap.core.robot.model import RobotModel
-from reachmap.errors import SceneError
-
-
-class BranchSolver(Protocol):
-    """A way to solve inverse kinematics."""
-
-    method: str
-    complete: bool
-
-    def branches(self, T: FloatArray) -> Rows:
-        """Solutions of poses (n, 4, 4), without whole turns."""
-        ...
 
 
 class Kinematics:
@@ -60,8 +43,7 @@ class Kinematics:
     def __init__(self, robot: RobotModel, spec: IkSpec | None = None) -> None:
         self.robot = robot
         self.chain = SerialChain.from_robot(robot)
-        self._spec = spec or robot.ik
-        self._solver = _solver(robot, self.chain, self._spec)
+        self._solver = choose_solver(robot, self.chain, spec or robot.ik)
         self._follower = Follower(robot)
         self._data = robot.model.createData()
 
@@ -78,19 +60,16 @@ class Kinematics:
     @property
     def approximation(self) -> str:
         """How solutions are sought where that proves nothing; "" if complete."""
-        solver = self._solver
-        if solver.complete:
-            return ""
-        if isinstance(solver, RedundantSolver):
-            name = self.robot.joint_names[solver.joint]
-            low, high = np.rad2deg([solver.values[0], solver.values[-1]])
-            return (
-                f"{name} sampled at {len(solver.values)} values from {low:.0f} to "
-                f"{high:.0f} deg, the other joints in closed form"
-            )
-        if isinstance(solver, NominalSolver):
-            return "closed form of the nominal arm, corrected by Newton steps"
-        return f"least squares from {self._spec.restarts} starts"
+        return self._solver.approximation
+
+    @property
+    def tolerance(self) -> float:
+        """Largest miss of a solution [m and rad].
+
+        1e-7, or what rounded angles of the URDF explain where the arm has fewer than
+        six axes: it could not meet a vertical tool if that is 7e-6 rad off.
+        """
+        return self._solver.tolerance
 
     def forward(self, q: FloatArray) -> FloatArray:
         """TCP pose T_base_tcp of a configuration, (dof,) to (4, 4)."""
@@ -125,8 +104,8 @@ class Kinematics:
     ) -> tuple[FloatArray, IntArray]:
         """All solutions for many poses.
 
-        Each solution is within the joint limits and misses its pose by less than
-        1e-6 m and 1e-6 rad. A pose's solutions do not depend on the other poses.
+        Each solution is within the joint limits and misses its pose by no more than
+        `tolerance`. A pose's solutions do not depend on the other poses.
         At a singularity where they form a curve, some of its points are returned.
 
         Parameters
@@ -159,7 +138,7 @@ class Kinematics:
         q_start: FloatArray,
         T: FloatArray,
         *,
-        tolerance: float = 1e-6,
+        tolerance: float | None = None,
         largest_step_rad: float = 0.2,
     ) -> FloatArray | None:
         """Follow poses that lie close to each other, a straight approach for example.
@@ -171,7 +150,8 @@ class Kinematics:
         T : array, shape (n, 4, 4)
             Poses T_base_tcp.
         tolerance : float
-            Largest miss of a pose [m and rad].
+            Largest miss of a pose [m and rad]; default: 1e-6, or the tolerance of
+            solutions if that is larger.
         largest_step_rad : float
             Largest change of a joint from pose to pose.
 
@@ -181,53 +161,8 @@ class Kinematics:
             A configuration for each pose; None if the branch ends, turns over or
             leaves the joint limits on the way.
         """
+        if tolerance is None:
+            tolerance = max(1e-6, self.tolerance)
         return self._follower.follow(
             q_start, T, tolerance=tolerance, largest_step_rad=largest_step_rad
-        )
-
-
-def _solver(robot: RobotModel, chain: SerialChain, spec: IkSpec) -> BranchSolver:
-    lower, upper = robot.lower_rad, robot.upper_rad
-    if spec.redundant_joint is not None:
-        _check_redundant_joint(robot, spec.redundant_joint)
-    if spec.method != "numeric":
-        if can_use_eaik(chain):
-            return AnalyticSolver(chain)
-        nominal = nominal_chain(chain)
-        if nominal is not None:
-            return NominalSolver(chain, nominal)
-        joint = _redundant_joint(robot, chain, spec)
-        if joint is not None:
-            return RedundantSolver(chain, lower, upper, joint, spec.redundant_samples)
-        if spec.method == "analytic":
-            raise SceneError(
-                "robot.ik.method: this arm has no closed form that is known to EAIK; "
-                "use auto or numeric"
-            )
-    return NumericSolver(chain, lower, upper, spec.restarts)
-
-
-def _redundant_joint(robot: RobotModel, chain: SerialChain, spec: IkSpec) -> int | None:
-    """Joint to sample, None if the arm is not one of seven axes that EAIK knows."""
-    if chain.dof != 7:
-        return None
-    candidates = list(reversed(range(chain.dof)))
-    if spec.redundant_joint is not None:
-        candidates = [robot.joint_names.index(spec.redundant_joint)]
-    # A value that is special for no arm: held at zero, axes may become parallel.
-    values = robot.lower_rad + 0.37 * (robot.upper_rad - robot.lower_rad)
-    usable = (k for k in candidates if can_use_eaik(chain, [(k, float(values[k]))]))
-    return next(usable, None)
-
-
-def _check_redundant_joint(robot: RobotModel, name: str) -> None:
-    if name not in robot.joint_names:
-        raise SceneError(
-            f"robot.ik.redundant_joint: no joint {name!r} moves "
-            f"(joints: {', '.join(robot.joint_names)})"
-        )
-    if robot.dof != 7:
-        raise SceneError(
-            "robot.ik.redundant_joint: only arms of seven joints have one, "
-            f"this one has {robot.dof}"
         )

@@ -1,123 +1,126 @@
-"""Calibrated arms: the closed form of the nominal arm, then steps to the true one.
+"""Nominal arms: what a URDF means where it was rounded or the arm calibrated.
 
-A calibrated URDF tilts axes that are parallel by design, by 1e-3 rad or less; EAIK
-knows the arm only if they are parallel to 1e-13. The nominal arm is found by making
-nearly parallel axes parallel, and nearly intersecting ones intersect.
+EAIK knows an arm only if its axes are parallel, or meet, to 1e-13. A URDF with angles
+such as 1.5708 misses that by 1e-5, a calibrated one by 1e-3, and a product of many
+rotations by its last place.
 """
 
 from __future__ import annotations
 
-import dataclasses
+from collections.abc import Iterator
 
 import numpy as np
 
 from reachmap._typing import FloatArray
-from reachmap.core.kinematics.analytic import EaikRows, can_use_eaik
-from reachmap.core.kinematics.numeric import ACCEPTED, matrix_difference, refine_many
-from reachmap.core.kinematics.solutions import Rows, distinct, joined, wrapped
+from reachmap.core.kinematics.refine import matrix_difference
 from reachmap.core.robot.chain import SerialChain
+from reachmap.geometry import transform_from_parts
+
+# Largest tilt [rad] and distance [m] that rounding of numbers explains.
+_LAST_PLACES = 1e-9
 
 # Largest tilt [rad] and distance [m] that calibration is taken to explain.
-_PARALLEL_RAD = 0.01
-_MEETING_M = 0.005
+_CALIBRATION_RAD = 0.01
+_CALIBRATION_M = 0.005
 
-# Rows of the nominal arm that miss by more than this [m or rad] on the true arm are
-# not worth steps.
-_WORTHWHILE = 0.2
+# What five digits leave of a rotation by multiples of 30 or 45 degrees: 3.1416 is off
+# by 7e-6, and an origin may have three of them.
+_ROUNDED_ANGLE = 2.5e-5
+_PLAIN = np.array([0.0, 0.5, np.sqrt(0.5), np.sqrt(0.75), 1.0])
 
-# Frames per block, which bounds the memory.
-_BLOCK = 512
+_AXES = 6
+
+# An arm that is further from its nominal one [m and rad] is not merely rounded.
+_LARGEST_ROUNDING = 2e-4
+
+# Of the bound that random configurations give, for those that were not tried.
+_MARGIN = 1.5
 
 
-class NominalSolver:
-    """Branches of an arm that differs slightly from one that EAIK knows.
+def nominal_arms(chain: SerialChain) -> Iterator[SerialChain]:
+    """Arms near a chain of revolute joints, the nearest, itself, first.
 
-    Parameters
-    ----------
-    chain : SerialChain
-        The true arm.
-    nominal : SerialChain
-        As `nominal_chain` makes it.
+    Of an arm of fewer than six axes whose angles are rounded, the poses that are asked
+    for are those of the arm with exact ones.
     """
-
-    method = "nominal-analytic"
-    # At the edge of reach, branches of the true arm may lack one of the nominal arm.
-    complete = False
-
-    def __init__(self, chain: SerialChain, nominal: SerialChain) -> None:
-        self._chain = chain
-        self._rows = EaikRows(nominal)
-
-    def branches(self, T: FloatArray) -> Rows:
-        """Solutions that meet their poses, without limits and turns.
-
-        Parameters
-        ----------
-        T : array, shape (n, 4, 4)
-            Poses T_base_tcp.
-        """
-        tables = []
-        for start in range(0, len(T), _BLOCK):
-            Q, frame = self._block(T[start : start + _BLOCK])
-            tables.append((Q, frame + start))
-        return joined(tables, self._chain.dof)
-
-    def _block(self, T: FloatArray) -> Rows:
-        Q, frame = self._rows(T)
-        missed = matrix_difference(T[frame], self._chain.forward_many(Q))
-        near = missed <= _WORTHWHILE
-        Q, frame = Q[near], frame[near]
-        Q, missed = refine_many(
-            self._chain, Q, T[frame], tolerance=1e-11, iterations=30
-        )
-        good = missed <= ACCEPTED
-        rows = (wrapped(Q[good], self._chain.is_revolute), frame[good])
-        return distinct(rows, self._chain.is_revolute)
+    if chain.dof < _AXES and rounding(chain):
+        yield rounded_arm(chain)
+    yield chain
+    yield _snapped(chain, _LAST_PLACES, _LAST_PLACES)
+    yield _snapped(rounded_arm(chain), _LAST_PLACES, _LAST_PLACES)
+    yield _snapped(chain, _CALIBRATION_RAD, _CALIBRATION_M)
 
 
-def nominal_chain(chain: SerialChain) -> SerialChain | None:
-    """Nearest arm that EAIK knows, None if there is none near.
+def rounded_arm(chain: SerialChain) -> SerialChain:
+    """Arm whose frames are turned by exact multiples of 30 or 45 degrees.
 
-    Only the axes and the vectors between them are those of the nominal arm.
+    Angles that are none of these within rounding stay as they are.
     """
-    if not chain.is_revolute.all() or chain.dof != 6:
-        return None
-    axes, points = _snapped(chain.axes_base.T, np.cumsum(chain.offsets_base.T, axis=0))
-    nominal = dataclasses.replace(
-        chain,
-        axes_base=axes.T.copy(),
-        offsets_base=np.diff(points, axis=0, prepend=0.0).T.copy(),
+    T = chain.T_fixed.copy()
+    R = T[:, :3, :3]
+    nearest = np.abs(np.abs(R)[..., None] - _PLAIN).argmin(axis=-1)
+    plain = np.copysign(_PLAIN[nearest], R)
+    R = np.where(np.abs(plain - R) < _ROUNDED_ANGLE, plain, R)
+    U, _, V_t = np.linalg.svd(R)
+    T = transform_from_parts(U @ V_t, T[:, :3, 3])
+    zero = [T[0]]
+    for step in T[1:]:
+        zero.append(zero[-1] @ step)
+    at_zero = np.array(zero)
+    return SerialChain.from_axes(
+        at_zero[:-1, :3, 2], at_zero[:-1, :3, 3], at_zero[-1], chain.is_revolute
     )
-    return nominal if can_use_eaik(nominal, within_rad=0.3) else None
 
 
-def _snapped(axes: FloatArray, points: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Axes (6, 3) and points on them, the last one the TCP, (7, 3)."""
-    axes, points = axes.copy(), points.copy()
+def rounding(chain: SerialChain) -> float:
+    """How far rounded angles put poses beside those of the nominal arm [m and rad].
+
+    Zero where they do not, or where the angles are not merely rounded.
+    """
+    rng = np.random.default_rng(0)
+    Q = rng.uniform(-np.pi, np.pi, (200, chain.dof))
+    apart = matrix_difference(
+        chain.forward_many(Q), rounded_arm(chain).forward_many(Q)
+    ).max()
+    is_rounded = _LAST_PLACES < apart < _LARGEST_ROUNDING
+    return _MARGIN * float(apart) if is_rounded else 0.0
+
+
+def _snapped(chain: SerialChain, parallel_rad: float, meeting_m: float) -> SerialChain:
+    """Make nearly parallel axes parallel, and nearly meeting neighbours meet."""
+    axes, points = chain.axes_base.T.copy(), chain.points_base
     for k in range(1, len(axes)):
         # Any point of an axis describes it; calibration likes far ones.
         along = axes[k] @ (points[k - 1] - points[k])
         points[k] = points[k] + along * axes[k]
-        turn = np.cross(axes[k - 1], axes[k])
-        if np.linalg.norm(turn) < _PARALLEL_RAD:
-            axes[k] = axes[k - 1] * np.sign(axes[k - 1] @ axes[k])
+        parallel = [
+            j
+            for j in range(k)
+            if np.linalg.norm(np.cross(axes[j], axes[k])) < parallel_rad
+        ]
+        if parallel:
+            reference = axes[parallel[0]]
+            axes[k] = reference * np.sign(reference @ axes[k])
+        if k - 1 in parallel:
             continue
-        meeting = _meeting_point(axes, points, k)
+        meeting = _meeting_point(axes, points, k, meeting_m)
         if meeting is not None:
             points[k] = meeting
-    return axes, points
+    return SerialChain.from_axes(axes, points, chain.tcp_at_zero, chain.is_revolute)
 
 
-def _meeting_point(axes: FloatArray, points: FloatArray, k: int) -> FloatArray | None:
+def _meeting_point(
+    axes: FloatArray, points: FloatArray, k: int, within_m: float
+) -> FloatArray | None:
     """Point where axis k is to meet the one before, None if they pass at a distance."""
     a, b, between = axes[k - 1], axes[k], points[k] - points[k - 1]
     normal = np.cross(a, b)
-    if abs(between @ normal) > _MEETING_M * np.linalg.norm(normal):
+    if abs(between @ normal) > within_m * np.linalg.norm(normal):
         return None
     # Where the common normal leaves the axis before.
     share = np.linalg.det(np.array([between, b, normal])) / (normal @ normal)
     meeting = points[k - 1] + share * a
-    if np.linalg.norm(meeting - points[k - 1]) < _MEETING_M:
+    if np.linalg.norm(meeting - points[k - 1]) < within_m:
         # Three axes of a spherical wrist: the last meets where the two before do.
         return np.asarray(points[k - 1])
     return np.asarray(meeting)

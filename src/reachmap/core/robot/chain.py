@@ -22,6 +22,10 @@ from reachmap.geometry import inverse_transform, transform_from_parts
 # Rows per block: the block's arrays, half a megabyte, stay in the cache.
 _BLOCK = 256
 
+# Sine of the angle from a half turn below which the axis is read off another part of
+# the rotation; both parts are good to 1e-13 there.
+_NEAR_HALF_TURN = 1e-2
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class SerialChain:
@@ -74,6 +78,63 @@ class SerialChain:
             axes_base=np.array(axes).T,
             offsets_base=np.diff(T[:, :3, 3], axis=0).T.copy(),
             R_base_tcp_zero=tcp.rotation.copy(),
+        )
+
+    @classmethod
+    def from_axes(
+        cls,
+        axes: FloatArray,
+        points: FloatArray,
+        T_base_tcp_zero: FloatArray,
+        is_revolute: BoolArray,
+    ) -> SerialChain:
+        """Build a chain from what its joints are at zero, all in robot_base.
+
+        Parameters
+        ----------
+        axes : array, shape (dof, 3)
+            Unit vectors.
+        points : array, shape (dof, 3)
+            A point on each axis [m].
+        T_base_tcp_zero : array, shape (4, 4)
+        is_revolute : array of bool, shape (dof,)
+        """
+        R = np.array([_frame_with_z(axis) for axis in axes]).reshape(-1, 3, 3)
+        T = np.concatenate([np.eye(4)[None], transform_from_parts(R, points)])
+        T = np.concatenate([T, T_base_tcp_zero[None]])
+        return cls(
+            T_fixed=inverse_transform(T[:-1]) @ T[1:],
+            is_revolute=np.asarray(is_revolute, bool),
+            axes_base=np.array(axes, float).T.copy(),
+            offsets_base=np.diff(T[:, :3, 3], axis=0).T.copy(),
+            R_base_tcp_zero=T_base_tcp_zero[:3, :3].copy(),
+        )
+
+    @property
+    def points_base(self) -> FloatArray:
+        """A point on each axis in robot_base at zero [m], shape (dof, 3)."""
+        return np.cumsum(self.offsets_base.T, axis=0)[:-1]
+
+    @property
+    def tcp_at_zero(self) -> FloatArray:
+        """TCP pose at zero, shape (4, 4)."""
+        return transform_from_parts(self.R_base_tcp_zero, self.offsets_base.sum(axis=1))
+
+    def held(self, joint: int, value: float) -> SerialChain:
+        """Take the chain without one of its joints, which stays at a value."""
+        q = np.zeros((1, self.dof))
+        q[0, joint] = value
+        T_base_joint = self.joint_frames_many(np.zeros((1, self.dof)))[0, joint]
+        moved = self.joint_frames_many(q)[0, joint] @ inverse_transform(T_base_joint)
+        axes, points = self.axes_base.T.copy(), self.points_base
+        axes[joint + 1 :] = axes[joint + 1 :] @ moved[:3, :3].T
+        points[joint + 1 :] = points[joint + 1 :] @ moved[:3, :3].T + moved[:3, 3]
+        others = np.arange(self.dof) != joint
+        return SerialChain.from_axes(
+            axes[others],
+            points[others],
+            moved @ self.tcp_at_zero,
+            self.is_revolute[others],
         )
 
     @property
@@ -156,8 +217,8 @@ def pose_error(T_goal: FloatArray, T: FloatArray) -> FloatArray:
     Returns
     -------
     array, shape (n, 6)
-        Translation [m] and rotation vector [rad]; its length is exact near 0 and
-        its direction is not reliable within 1e-6 of a half turn.
+        Translation [m] and rotation vector [rad], at most a half turn long; exactly
+        at a half turn, where both directions do, either.
     """
     error = np.empty((len(T), 6))
     error[:, :3] = T_goal[:, :3, 3] - T[:, :3, 3]
@@ -167,10 +228,34 @@ def pose_error(T_goal: FloatArray, T: FloatArray) -> FloatArray:
         (D[:, 2, 1] - D[:, 1, 2], D[:, 0, 2] - D[:, 2, 0], D[:, 1, 0] - D[:, 0, 1]), 1
     )
     sine = np.sqrt((v * v).sum(1))
-    angle = np.arctan2(sine, 0.5 * (D[:, 0, 0] + D[:, 1, 1] + D[:, 2, 2] - 1.0))
+    cosine = 0.5 * (D[:, 0, 0] + D[:, 1, 1] + D[:, 2, 2] - 1.0)
+    angle = np.arctan2(sine, cosine)
     scale = np.where(sine > 1e-12, angle / np.maximum(sine, 1e-12), 1.0)
     error[:, 3:] = v * scale[:, None]
+    # Towards a half turn v vanishes, and with it the direction that it gives.
+    far = np.flatnonzero((cosine < 0.0) & (sine < _NEAR_HALF_TURN))
+    if len(far):
+        error[far, 3:] = _axis_of_half_turn(D[far], v[far]) * angle[far, None]
     return error
+
+
+def _axis_of_half_turn(D: FloatArray, v: FloatArray) -> FloatArray:
+    """Unit axes of rotations by nearly a half turn, (n, 3, 3) to (n, 3).
+
+    Parameters
+    ----------
+    D : array, shape (n, 3, 3)
+    v : array, shape (n, 3)
+        The axes times the small sine of the angle, for their sign.
+    """
+    # D + Dᵀ = 2 c I + 2 (1 - c) a aᵀ: every column of a aᵀ is along the axis.
+    S = D + np.swapaxes(D, 1, 2)
+    trace = np.trace(D, axis1=1, axis2=2)
+    S -= (trace - 1.0)[:, None, None] * np.eye(3)
+    largest = np.argmax(np.diagonal(S, axis1=1, axis2=2), axis=1)
+    axis = S[np.arange(len(S)), largest]
+    axis /= np.sqrt((axis * axis).sum(1))[:, None]
+    return np.asarray(axis * np.where((axis * v).sum(1) < 0.0, -1.0, 1.0)[:, None])
 
 
 def _joint_parts(fixed: FloatArray) -> FloatArray:

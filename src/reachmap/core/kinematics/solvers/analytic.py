@@ -7,21 +7,27 @@ there, and its least-squares flag is no guide), joint limits and whole turns.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
-from eaik.pybindings import EAIK
 
 from reachmap._typing import BoolArray, FloatArray, IntArray
-from reachmap.core.kinematics.numeric import ACCEPTED, matrix_difference, refine_many
-from reachmap.core.kinematics.solutions import Rows, angular_distance, distinct, joined
+from reachmap.core.kinematics.closed_form import (
+    ACCEPTED,
+    MET,
+    SELF_TESTS,
+    ClosedForm,
+    find_closed_form,
+)
+from reachmap.core.kinematics.refine import matrix_difference, refine_many
+from reachmap.core.kinematics.solutions import (
+    Rows,
+    angular_distance,
+    distinct,
+    joined,
+    wrapped,
+)
+from reachmap.core.kinematics.solvers.arm import Arm, Way
 from reachmap.core.robot.chain import SerialChain
 from reachmap.geometry import transform_from_parts
-
-# EAIK's solutions miss by 1e-12; a row that misses by less than _NEAR is worth
-# polishing [m and rad].
-MET = 1e-9
-_NEAR = 1e-3
 
 # Poses are turned aside by this angle [rad]: enough for EAIK to be regular again.
 _ASIDE_RAD = 1e-5
@@ -53,95 +59,46 @@ _ASIDE_FOUR_WAYS = tuple(
 )
 
 
-class EaikRows:
-    """EAIK's raw rows for many poses.
+class AnalyticSolver:
+    """All branches of an arm that EAIK knows, or of one near such an arm.
+
+    In a self-test, random configurations are to be found again at their poses, which
+    are perturbed in their last places.
 
     Parameters
     ----------
     chain : SerialChain
-        Revolute joints only.
-    fixed : sequence of (int, float), optional
-        Joints held at a value, by index.
+    form : ClosedForm
+    tolerance : float
+        Largest miss of a solution [m and rad].
     """
 
-    def __init__(
-        self, chain: SerialChain, fixed: Sequence[tuple[int, float]] = ()
-    ) -> None:
-        self._robot = EAIK.Robot(
-            chain.axes_base,
-            chain.offsets_base,
-            chain.R_base_tcp_zero,
-            [(int(joint), float(value)) for joint, value in fixed],
-            True,
+    def __init__(self, chain: SerialChain, form: ClosedForm, tolerance: float) -> None:
+        self._chain, self._form, self._rows = chain, form, form.rows
+        self.tolerance = tolerance
+
+    @property
+    def method(self) -> str:
+        """Name that is stored with maps."""
+        return "nominal-analytic" if self._form.is_nominal else "analytic"
+
+    @property
+    def complete(self) -> bool:
+        """Whether a pose without solutions is proved to have none."""
+        # At the edge of reach, branches of an arm may lack one of its nominal arm.
+        return self._form.score == SELF_TESTS and not self._form.is_nominal
+
+    @property
+    def approximation(self) -> str:
+        """How solutions are sought where that proves nothing; "" if complete."""
+        if self.complete:
+            return ""
+        how = "corrected by Newton steps" if self._form.is_nominal else "by EAIK"
+        arm = "nominal arm" if self._form.is_nominal else "arm"
+        return (
+            f"closed form of the {arm}, {how}; a self-test found "
+            f"{self._form.score} of {SELF_TESTS} configurations again"
         )
-        self._dof = chain.dof
-
-    def __call__(self, T: FloatArray) -> Rows:
-        """Rows of all poses, least-squares ones included, (n, 4, 4) to a table."""
-        solve = self._robot.calculate_IK
-        found = [solve(pose).Q for pose in T]
-        counts = [len(rows) for rows in found]
-        frame = np.repeat(np.arange(len(T)), counts)
-        # Without solutions EAIK's array may lack columns as well as rows.
-        some = [rows for rows in found if len(rows)]
-        Q = np.concatenate([np.zeros((0, self._dof)), *some])
-        finite = np.isfinite(Q).all(axis=1)
-        return Q[finite], frame[finite]
-
-    @property
-    def family(self) -> str:
-        """EAIK's name of the structure."""
-        return str(self._robot.get_kinematic_family())
-
-    @property
-    def is_known(self) -> bool:
-        """Whether EAIK has a decomposition for the structure."""
-        # For five axes the flag is true even when the family is unknown.
-        known = bool(self._robot.has_known_decomposition())
-        return known and "Unknown" not in self.family
-
-
-def can_use_eaik(
-    chain: SerialChain,
-    fixed: Sequence[tuple[int, float]] = (),
-    *,
-    within_rad: float = 1e-6,
-) -> bool:
-    """Whether EAIK solves this arm: known structure, and it passes a self-test.
-
-    In the self-test EAIK finds random configurations within `within_rad`.
-    The rank is tested before EAIK sees the arm: four parallel axes, for example,
-    end the process with a segmentation fault.
-    """
-    held = [joint for joint, _ in fixed]
-    free = [k for k in range(chain.dof) if k not in held]
-    if not chain.is_revolute.all() or len(free) > 6:
-        return False
-    rng = np.random.default_rng(0)
-    Q = rng.uniform(-np.pi, np.pi, (12, chain.dof))
-    for joint, value in fixed:
-        Q[:, joint] = value
-    T, J = chain.jacobian_many(Q)
-    ranks = np.linalg.matrix_rank(J[:, :, free], tol=1e-9)
-    if ranks.max() < len(free):
-        return False
-    rows = EaikRows(chain, fixed)
-    if not rows.is_known:
-        return False
-    Q_found, frame = rows(T)
-    differs = angular_distance(Q_found - Q[frame], chain.is_revolute).max(axis=1)
-    return bool(np.isin(np.arange(len(Q)), frame[differs < within_rad]).all())
-
-
-class AnalyticSolver:
-    """All branches of an arm that EAIK knows."""
-
-    method = "analytic"
-    complete = True
-
-    def __init__(self, chain: SerialChain) -> None:
-        self._chain = chain
-        self._rows = EaikRows(chain)
 
     def branches(self, T: FloatArray) -> Rows:
         """Solutions that meet their poses, without limits and turns.
@@ -179,18 +136,19 @@ class AnalyticSolver:
         Q, frame = raw
         residual = matrix_difference(T[frame], self._chain.forward_many(Q))
         met = residual <= MET
-        near = ~met & (residual <= _NEAR)
+        near = ~met & (residual <= self._form.near)
         if not near.any():
             return distinct((Q[met], frame[met]), self._chain.is_revolute)
         Q_near, missed = refine_many(
             self._chain,
             Q[near],
             T[frame[near]],
-            tolerance=1e-13,
+            tolerance=1e-11 if self._form.is_nominal else 1e-13,
             iterations=30,
-            singular=True,
+            singular=not (self._form.is_nominal or self.tolerance > ACCEPTED),
         )
-        good = missed <= ACCEPTED
+        good = missed <= self.tolerance
+        Q_near = wrapped(Q_near, self._chain.is_revolute)
         polished = (Q_near[good], frame[near][good])
         rows = joined([(Q[met], frame[met]), polished], self._chain.dof)
         return distinct(rows, self._chain.is_revolute)
@@ -219,7 +177,7 @@ class AnalyticSolver:
         Q, residual = refine_many(
             self._chain, Q, T[frame], tolerance=1e-13, iterations=30, singular=True
         )
-        good = residual <= ACCEPTED
+        good = residual <= self.tolerance
         return Q[good], frame[good]
 
 
@@ -244,3 +202,11 @@ def _padded(rows: Rows, n: int) -> FloatArray:
     slot = np.arange(len(Q)) - np.repeat(np.cumsum(counts) - counts, counts)
     table[frame, slot] = Q
     return table
+
+
+def _offer(arm: Arm) -> AnalyticSolver | None:
+    form = find_closed_form(arm.chain, tolerance=arm.tolerance)
+    return None if form is None else AnalyticSolver(arm.chain, form, arm.tolerance)
+
+
+WAY = Way(rank=1, is_closed_form=True, offer=_offer)

@@ -1,0 +1,218 @@
+"""Inverse kinematics of redundant arms: joints on a grid, EAIK for the rest.
+
+The redundant joint is one of a seven-axis arm, or a rail or gantry that carries an
+arm. The solutions of a pose form curves; the grid takes points from them. A pose that
+has none on the grid may still be reachable: the method is not complete.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import product
+
+import numpy as np
+
+from reachmap._typing import FloatArray, IntArray
+from reachmap.core.kinematics.closed_form import (
+    ACCEPTED,
+    MET,
+    ClosedForm,
+    find_closed_form,
+)
+from reachmap.core.kinematics.refine import matrix_difference, refine_many
+from reachmap.core.kinematics.solutions import (
+    Rows,
+    can_be_within,
+    distinct,
+    joined,
+    turned_into,
+    wrapped,
+)
+from reachmap.core.kinematics.solvers.arm import FULL_AXES, Arm, Way
+
+# Rows per pose from which a solution is sought where the grid has none.
+_SEEDS = 8
+
+# Rows of a nominal arm that miss by more [m or rad] are not worth steps.
+_NEAR_NOMINAL = 0.2
+
+# Self-test of the closed form for each value; the whole is never complete anyway.
+_TESTS = 12
+
+# Frames per block, which bounds the memory.
+_BLOCK = 256
+
+
+class RedundantSolver:
+    """Branches for each value of the joints that are sampled.
+
+    Parameters
+    ----------
+    arm : Arm
+    joints : tuple of int
+        Joints that are sampled.
+
+    Attributes
+    ----------
+    values : list of tuple of float
+        Values of these joints for which the others have a closed form.
+    """
+
+    method = "redundant-grid"
+    complete = False
+    tolerance = ACCEPTED
+
+    def __init__(self, arm: Arm, joints: tuple[int, ...]) -> None:
+        self._arm, self._chain = arm, arm.chain
+        self._lower, self._upper = arm.lower, arm.upper
+        self._joints = joints
+        self._others = [k for k in range(arm.chain.dof) if k not in joints]
+        self.values: list[tuple[float, ...]] = []
+        self._forms: list[ClosedForm] = []
+        for values in product(*self._grids()):
+            form = _closed_form_with(arm, joints, values)
+            if form is not None:
+                self.values.append(values)
+                self._forms.append(form)
+
+    def _grids(self) -> Iterator[list[float]]:
+        # Several joints share the samples, or their number would be squared.
+        share = self._arm.spec.redundant_samples ** (1.0 / len(self._joints))
+        for k in self._joints:
+            yield _grid(
+                self._lower[k],
+                self._upper[k],
+                int(np.ceil(share)),
+                turns=bool(self._chain.is_revolute[k]),
+            ).tolist()
+
+    @property
+    def approximation(self) -> str:
+        """How solutions are sought."""
+        table = np.array(self.values)
+        parts = []
+        for k, column in zip(self._joints, table.T, strict=True):
+            scale, unit = (
+                (180.0 / np.pi, "deg") if self._chain.is_revolute[k] else (1.0, "m")
+            )
+            digits = 0 if unit == "deg" else 2
+            low, high = (f"{v:.{digits}f}" for v in np.sort(column)[[0, -1]] * scale)
+            parts.append(
+                f"{self._arm.joint_names[k]} sampled at {len(np.unique(column))} "
+                f"values from {low} to {high} {unit}"
+            )
+        return f"{', '.join(parts)}, the other joints in closed form"
+
+    def branches(self, T: FloatArray) -> Rows:
+        """Solutions that meet their poses, some turn of them within the limits.
+
+        Parameters
+        ----------
+        T : array, shape (n, 4, 4)
+            Poses T_base_tcp.
+        """
+        tables = []
+        for start in range(0, len(T), _BLOCK):
+            Q, frame = self._block(T[start : start + _BLOCK])
+            tables.append((Q, frame + start))
+        return joined(tables, self._chain.dof)
+
+    def _block(self, T: FloatArray) -> Rows:
+        tables = [
+            self._rows(form, values, T)
+            for form, values in zip(self._forms, self.values, strict=True)
+        ]
+        raw = joined([self._allowed(table) for table in tables], self._chain.dof)
+        Q, frame = raw
+        residual = matrix_difference(T[frame], self._chain.forward_many(Q))
+        met = residual <= MET
+        solved = [(Q[met], frame[met])]
+        if any(form.is_nominal for form in self._forms):
+            near = ~met & (residual <= _NEAR_NOMINAL)
+            solved.append(self._polished(Q[near], frame[near], T))
+        rows = distinct(joined(solved, self._chain.dof), self._chain.is_revolute)
+        counts = np.bincount(rows[1], minlength=len(T))
+        more = self._between_samples(raw, T, np.flatnonzero(counts == 0))
+        return joined([rows, more], self._chain.dof)
+
+    def _rows(self, form: ClosedForm, values: tuple[float, ...], T: FloatArray) -> Rows:
+        Q_others, frame = form.rows(T)
+        Q = np.empty((len(frame), self._chain.dof))
+        Q[:, self._others] = Q_others
+        Q[:, list(self._joints)] = values
+        return Q, frame
+
+    def _polished(self, Q: FloatArray, frame: IntArray, T: FloatArray) -> Rows:
+        Q, missed = refine_many(
+            self._chain, Q, T[frame], tolerance=1e-11, iterations=30
+        )
+        good = missed <= ACCEPTED
+        return self._allowed((wrapped(Q[good], self._chain.is_revolute), frame[good]))
+
+    def _between_samples(self, raw: Rows, T: FloatArray, missing: IntArray) -> Rows:
+        """Solutions near the best rows of the grid, with the sampled joint free.
+
+        Near the edge of reach the curves of solutions are shorter than the grid's
+        spacing.
+        """
+        keep = np.isin(raw[1], missing)
+        frame = raw[1][keep]
+        Q = turned_into(raw[0][keep], self._lower, self._upper, self._chain.is_revolute)
+        residual = matrix_difference(T[frame], self._chain.forward_many(Q))
+        order = np.lexsort((residual, frame))
+        Q, frame = Q[order], frame[order]
+        counts = np.bincount(frame, minlength=len(T))
+        place = np.arange(len(Q)) - np.repeat(np.cumsum(counts) - counts, counts)
+        Q, frame = Q[place < _SEEDS], frame[place < _SEEDS]
+        rows = self._polished(Q, frame, T)
+        return distinct(rows, self._chain.is_revolute)
+
+    def _allowed(self, rows: Rows) -> Rows:
+        keep = can_be_within(rows[0], self._lower, self._upper, self._chain.is_revolute)
+        return rows[0][keep], rows[1][keep]
+
+
+def _grid(lower: float, upper: float, samples: int, *, turns: bool) -> FloatArray:
+    """Values from limit to limit, or once around if the joint turns further."""
+    if samples == 1:
+        return np.array([(lower + upper) / 2])
+    once_around = 2.0 * np.pi * (1.0 - 1.0 / samples) if turns else np.inf
+    return np.linspace(lower, lower + min(upper - lower, once_around), samples)
+
+
+def _closed_form_with(
+    arm: Arm, joints: tuple[int, ...], values: tuple[float, ...]
+) -> ClosedForm | None:
+    """Closed form of the other joints while these stay at values."""
+    chain = arm.chain
+    for joint, value in sorted(zip(joints, values, strict=True), reverse=True):
+        chain = chain.held(joint, value)
+    return find_closed_form(chain, tests=_TESTS)
+
+
+def _candidates(arm: Arm) -> list[tuple[int, ...]]:
+    """Joints that may be sampled, so that six are left; rails first."""
+    chain, named = arm.chain, arm.spec.redundant_joint
+    rails = tuple(np.flatnonzero(~chain.is_revolute).tolist())
+    turning = [k for k in reversed(range(chain.dof)) if k not in rails]
+    left = chain.dof - FULL_AXES - len(rails)
+    choices = [rails] if left == 0 else [(*rails, k) for k in turning if left == 1]
+    if named is None:
+        return choices
+    joint = arm.joint_names.index(named)
+    return [choice for choice in choices if joint in choice]
+
+
+def _offer(arm: Arm) -> RedundantSolver | None:
+    if arm.chain.dof <= FULL_AXES:
+        return None
+    # A value that is special for no arm: held at zero, axes may become parallel.
+    typical = arm.lower + 0.37 * (arm.upper - arm.lower)
+    for joints in _candidates(arm):
+        values = tuple(float(typical[k]) for k in joints)
+        if _closed_form_with(arm, joints, values) is not None:
+            return RedundantSolver(arm, joints)
+    return None
+
+
+WAY = Way(rank=2, is_closed_form=True, offer=_offer)
