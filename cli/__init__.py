@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import os
 from typing import NoReturn
 
 import click
 
 from reachmap import __version__
 from reachmap.cli.group import PipelineGroup
+from reachmap.cli.streams import prepare_streams
 
 __all__ = ["group", "main"]
 
@@ -41,5 +43,8 @@ def group() -> None:
 
 def main() -> NoReturn:
     """Run the command line and exit with the code of the table in ``failures``."""
+    prepare_streams()
+    # Pictures are drawn to files; a notebook's backend may not even be installed here.
+    os.environ["MPLBACKEND"] = "agg"
     group.main(prog_name="reachmap")
     raise AssertionError("unreachable")

@@ -5,7 +5,7 @@ Code  Meaning
 ===== ==========================================================================
 0     done
 1     done, but a gate that was asked for did not hold (``--fail-under``)
-2     wrong usage or wrong input; nothing was changed
+2     wrong usage or wrong input, or the answer cannot be written
 3     unfinished; the same command resumes
 70    an internal error; ``--debug`` shows where
 130   interrupted
@@ -15,7 +15,6 @@ Code  Meaning
 
 from __future__ import annotations
 
-import os
 import sys
 import traceback
 from collections.abc import Callable, Iterable
@@ -24,7 +23,8 @@ from typing import Any
 
 import click
 
-from reachmap.errors import ReachmapError
+from reachmap.cli.streams import AnswerError, discard_stdout
+from reachmap.errors import OutputError, ReachmapError
 
 INTERNAL_ERROR = 70
 INTERRUPTED = 130
@@ -63,7 +63,8 @@ def exit_code_of(run: Callable[[], Any], state: RunState) -> int:
         result = run()
         sys.stdout.flush()
     except (BrokenPipeError, PipeClosedError):
-        return _pipe_closed()
+        discard_stdout()
+        return PIPE_CLOSED
     except click.ClickException as error:
         error.show()
         return error.exit_code
@@ -72,6 +73,10 @@ def exit_code_of(run: Callable[[], Any], state: RunState) -> int:
     except ReachmapError as error:
         _report(error.lines, state)
         return error.exit_code
+    except AnswerError as error:
+        discard_stdout()
+        _report([f"standard output cannot be written ({error.strerror})"], state)
+        return OutputError.exit_code
     except Exception as error:
         _report(_internal_lines(error, state), state)
         return INTERNAL_ERROR
@@ -99,15 +104,3 @@ def _interrupted(error: BaseException) -> int:
     for line in message.splitlines():
         click.echo(f"reachmap: {line}", err=True)
     return INTERRUPTED
-
-
-def _pipe_closed() -> int:
-    # Python flushes stdout once more at exit; give it a place where that works.
-    devnull = os.open(os.devnull, os.O_WRONLY)
-    try:
-        os.dup2(devnull, sys.stdout.fileno())
-    except (OSError, ValueError):
-        pass  # a captured stdout has no descriptor
-    finally:
-        os.close(devnull)
-    return PIPE_CLOSED

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import difflib
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib import import_module
 from importlib.util import find_spec
+from pathlib import Path
 from typing import Any
 
 import click
@@ -15,6 +17,7 @@ from click.shell_completion import CompletionItem
 
 from reachmap.cli.failures import PipeClosedError, RunState, exit_code_of
 from reachmap.cli.verbosity import configure_logging, verbosity_parameters
+from reachmap.errors import SettingsError
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -100,6 +103,23 @@ def sections(commands: dict[str, Entry]) -> dict[str, list[tuple[str, str]]]:
     return grouped
 
 
+def _require_folder() -> None:
+    try:
+        Path.cwd()
+    except OSError:
+        raise SettingsError(
+            "the current folder is gone, or may not be entered; change to another"
+        ) from None
+
+
+@contextmanager
+def _pipe_told_apart() -> Iterator[None]:
+    try:
+        yield
+    except BrokenPipeError as error:
+        raise PipeClosedError from error
+
+
 class PipelineGroup(click.Group):
     """A click group that knows its commands by table and imports them on use."""
 
@@ -155,12 +175,17 @@ class PipelineGroup(click.Group):
         ]
         return names + click.Command.shell_complete(self, ctx, incomplete)
 
+    def make_context(
+        self, info_name: str | None, args: list[str], *rest: Any, **extra: Any
+    ) -> click.Context:
+        """Parse the options of the group, ``--help`` among them."""
+        with _pipe_told_apart():
+            return super().make_context(info_name, args, *rest, **extra)
+
     def invoke(self, ctx: click.Context) -> Any:
         """Run the command; a closed pipe is told apart from a failure."""
-        try:
+        with _pipe_told_apart():
             return super().invoke(ctx)
-        except BrokenPipeError as error:
-            raise PipeClosedError from error
 
     def main(  # type: ignore[override]
         self,
@@ -177,6 +202,7 @@ class PipelineGroup(click.Group):
         configure_logging(state.verbosity)
 
         def run() -> Any:
+            _require_folder()
             return super(PipelineGroup, self).main(
                 args, prog_name, standalone_mode=False, obj=state, **extra
             )

@@ -28,3 +28,30 @@ def is_folder(path: Path) -> bool:
 def real_path(path: Path | str) -> Path:
     """Absolute path without symbolic links, as far as they lead anywhere."""
     return Path(os.path.realpath(path))
+
+
+def recorded_name(name: str) -> str:
+    r"""Spell a name from the system as text that can be stored: UTF-8, as it mostly is.
+
+    Python hands over bytes that its locale cannot decode as lone surrogates. Those
+    that are UTF-8 are decoded, others are shown as ``\xff``.
+
+    Examples
+    --------
+    >>> recorded_name("bin.h5"), recorded_name("\udcff")
+    ('bin.h5', '\\xff')
+    """
+    try:
+        return os.fsencode(name).decode("utf-8", "backslashreplace")
+    except UnicodeEncodeError:
+        return name.encode("utf-8", "backslashreplace").decode()
+
+
+def is_text(name: str) -> bool:
+    """Whether a name is text that can be stored: its bytes are UTF-8."""
+    try:
+        os.fsencode(name).decode()
+    except UnicodeError:
+        # The locale cannot spell it, which does not keep it from being stored.
+        return not any("\ud800" <= letter <= "\udfff" for letter in name)
+    return True

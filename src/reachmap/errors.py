@@ -9,6 +9,7 @@
     ├── MapFileError (OSError)             2   an artefact or journal, as input
     ├── SettingsError (ValueError)         2   an option or argument
     ├── OutputError (OSError)              2   a place where nothing can be written
+    │   └── NoRoomError                    2   the disk or a quota is full
     ├── MissingExtraError (ImportError)    2   an optional dependency
     ├── GateFailedError                    1   a requested gate did not hold
     ├── IncompleteError                    3   unfinished, can be resumed
@@ -65,6 +66,10 @@ class SettingsError(ReachmapError, ValueError):
 
 class OutputError(ReachmapError, OSError):
     """A result cannot be written: it exists, is in use, or the folder refuses."""
+
+
+class NoRoomError(OutputError):
+    """The disk, a quota or a limit on file sizes is full; a scan keeps its store."""
 
 
 class MissingExtraError(ReachmapError, ImportError):

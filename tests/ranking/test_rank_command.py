@@ -178,7 +178,7 @@ def test_outputs_are_not_overwritten(folder):
     before = (folder / "pile-1.json").read_bytes()
     result = run("pile-1.json", "-o", "pile-1.json", "--overwrite")
     assert result.exit_code == 2
-    assert "would replace the supplied list" in result.stderr
+    assert "which this command reads" in result.stderr
     assert (folder / "pile-1.json").read_bytes() == before
 
 
@@ -193,7 +193,7 @@ def test_outputs_are_not_overwritten(folder):
         (["pile-1.json", "--frame", "camera"], "states its own frame"),
         (["pile-1.json", "--explain", "XX-9"], "no grasp has the id 'XX-9'"),
         (["pile-1.json", "pile-2.json", "--explain", "NW-00"], "2 grasps answer to"),
-        (["pile-1.json", "--chart", "chart.pdf"], "a chart is a .png or an .svg"),
+        (["pile-1.json", "--chart", "chart.pdf"], "expected a name in .png or .svg"),
         (["pile-1.json", "-o", "no/such/folder/r.json"], "does not exist"),
     ],
 )

@@ -23,13 +23,14 @@ from reachmap.cell.text.yaml_reader import (
     parse_yaml,
     read_text,
 )
-from reachmap.disk import is_file
+from reachmap.disk import is_file, is_text, recorded_name
 from reachmap.errors import CellError
 
 __all__ = [
     "LoadedCell",
     "cell_from_json",
     "cell_from_text",
+    "cell_path",
     "read_cell",
     "shipped_cells",
     "stored_cell",
@@ -59,7 +60,10 @@ def read_cell(name_or_path: str, overrides: Sequence[str] = ()) -> LoadedCell:
     CellError
         Every mistake is a line ``file:line:column: key.path: …``.
     """
-    path = _find(str(name_or_path))
+    path = cell_path(str(name_or_path))
+    if not is_text(str(path.absolute())):
+        name = recorded_name(str(path.absolute()))
+        raise CellError(f"{name}: the path is not UTF-8 text, and could not be stored")
     text = read_text(path, limit=MAX_TEXT_BYTES)
     return cell_from_text(
         text,
@@ -120,8 +124,14 @@ def cell_from_text(
     )
 
 
-def _find(name_or_path: str) -> Path:
-    """Path of a cell file, or of the shipped cell of that name."""
+def cell_path(name_or_path: str) -> Path:
+    """Path of a cell file, or of the shipped cell of that name.
+
+    Raises
+    ------
+    CellError
+        There is neither.
+    """
     path = Path(name_or_path)
     if path.suffix in SUFFIXES or len(path.parts) > 1:
         return path

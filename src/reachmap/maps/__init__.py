@@ -7,7 +7,7 @@ bytes up to what its numbers say to each other.
 from __future__ import annotations
 
 from reachmap.maps.bytes.hashing import canonical_json, config_sha256
-from reachmap.maps.bytes.publish import check_output, publish
+from reachmap.maps.bytes.publish import check_output, check_outputs, publish
 from reachmap.maps.format.bin import read_bin_map, write_bin_map
 from reachmap.maps.format.placement import read_placement, write_placement
 from reachmap.maps.format.registry import read_provenance
@@ -43,6 +43,7 @@ __all__ = [
     "artefact_kind",
     "canonical_json",
     "check_output",
+    "check_outputs",
     "collect_provenance",
     "config_sha256",
     "publish",

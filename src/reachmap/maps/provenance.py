@@ -13,6 +13,7 @@ from datetime import datetime
 from importlib import metadata
 from typing import TYPE_CHECKING, Any
 
+from reachmap.disk import recorded_name
 from reachmap.errors import MapFileError
 from reachmap.maps.bytes.tree import plain
 from reachmap.maps.records import Provenance, RunInfo
@@ -77,7 +78,8 @@ class RunClock:
 
     def __init__(self, *, workers: int = 1, argv: Sequence[str] | None = None) -> None:
         self.workers = workers
-        self.command_line = shlex.join(sys.argv if argv is None else argv)
+        words = sys.argv if argv is None else argv
+        self.command_line = recorded_name(shlex.join(words))
         self.started = _now()
         self.wall_s: dict[str, float] = {}
         self.cpu_s: dict[str, float] = {}
@@ -102,7 +104,7 @@ class RunClock:
         return RunInfo(
             started=self.started,
             finished=_now(),
-            host=socket.gethostname(),
+            host=recorded_name(socket.gethostname()),
             command_line=self.command_line,
             workers=self.workers,
             wall_s=dict(self.wall_s),

@@ -38,6 +38,12 @@ LISTS = {
 Read = TypeVar("Read")
 
 
+def usual_files(folder: Path) -> list[Path]:
+    """Where the results of a run are looked for, there or not."""
+    names = [name for _, name, _ in ARTEFACTS.values()]
+    return [folder / name for name in (*names, *(name for name, _ in LISTS.values()))]
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunFolder:
     """The results of a run, as far as they are there.

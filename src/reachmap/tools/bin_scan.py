@@ -26,6 +26,11 @@ from reachmap.tools.options import (
     cell_of_artefact,
     with_seed,
 )
+from reachmap.tools.prologue import (
+    check_scan_output,
+    path_of_cell,
+    refuse_cell_files,
+)
 
 if TYPE_CHECKING:
     from reachmap.cell.loading import LoadedCell
@@ -71,9 +76,11 @@ def bin_scan(
     ReachmapError
         See :mod:`reachmap.errors`.
     """
+    check_scan_output(output, run, [placement, workspace, path_of_cell(cell)])
     loaded, source = load_placed_cell(
         placement, cell, with_seed(overrides, seed), workspace
     )
+    refuse_cell_files([output], loaded)
     scene = Scene.build(loaded, with_bin=True)
     scene.require_free_scan_configuration()
     document = scan_document(

@@ -63,7 +63,7 @@ def export_cell(
     from reachmap.maps import read_provenance
 
     if output is not None:
-        check_output(output, overwrite=overwrite)
+        check_output(output, overwrite=overwrite, inputs=[artefact])
     kept = read_provenance(artefact)
     cell = stored_cell(kept.cell_resolved_json, source=str(artefact)).cell
     text = cell_yaml(cell, comment=f"Cell of {artefact.name}, as resolved by reachmap.")

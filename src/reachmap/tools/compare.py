@@ -154,6 +154,7 @@ def draw(
         kind="svg" if suffix == ".svg" else "png",
         config_sha256=comparison.after.stamp.config_sha256,
         overwrite=overwrite,
+        inputs=comparison.paths,
     )
 
 

@@ -94,6 +94,7 @@ def heatmap(
         kind=kind,
         config_sha256=record.stamp.config_sha256,
         overwrite=overwrite,
+        inputs=[artefact, *(() if workspace is None else [workspace])],
     )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from reachmap.maps import check_outputs
 from reachmap.runtime.merge import merge_journals
 from reachmap.runtime.run import Outcome
 
@@ -25,4 +26,5 @@ def merge(shards: Sequence[Path], *, output: Path, overwrite: bool = False) -> O
     -------
     Outcome
     """
+    check_outputs([output], overwrite=overwrite, inputs=shards)
     return merge_journals(shards, output=output, overwrite=overwrite)

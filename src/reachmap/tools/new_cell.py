@@ -31,7 +31,7 @@ from reachmap.core.robot.model import RobotModel
 from reachmap.core.scene import Scene
 from reachmap.errors import ReachmapError, SettingsError
 from reachmap.geometry import AXES
-from reachmap.maps.bytes.publish import check_output, publish
+from reachmap.maps.bytes.publish import check_output, check_outputs, publish
 
 SAMPLES = 2000
 MANY = 40
@@ -84,11 +84,12 @@ def new_cell(
     CellError, SettingsError, OutputError
         The URDF cannot be used, a link does not exist, or nothing can be written.
     """
-    target = check_output(output, overwrite=overwrite)
+    target = check_output(output, overwrite=overwrite, inputs=[urdf])
     folder = target.parent
+    srdf_target = target.with_suffix(".srdf")
+    check_outputs([output, srdf_target], overwrite=True, inputs=[urdf])
     reference = _reference(urdf, folder)
     choices, robot = _first_choices(reference, folder, base, tip)
-    srdf_target = target.with_suffix(".srdf")
     choices, srdf, problems = _tried(choices, robot, folder, srdf_target.name)
     if srdf:
         publish(srdf_target, [srdf.encode()], overwrite=overwrite)

@@ -19,11 +19,12 @@ from reachmap.maps import (
     BinPlacement,
     RunClock,
     WorkspaceMap,
-    check_output,
+    check_outputs,
     publish,
     read_workspace_map,
     write_placement,
 )
+from reachmap.maps.bytes.publish import check_picture
 from reachmap.maps.records import Stamp
 from reachmap.placement.decision import (
     Decision,
@@ -50,6 +51,7 @@ from reachmap.scans.document import (
     scan_document,
 )
 from reachmap.tools.options import IN_PROCESS, RunOptions, cell_of_artefact, with_seed
+from reachmap.tools.prologue import refuse_cell_files
 
 if TYPE_CHECKING:
     from reachmap.cell.loading import LoadedCell
@@ -63,7 +65,6 @@ __all__ = [
 ]
 
 RULES = ("search", "paper")
-PICTURES = (".png", ".svg")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -130,12 +131,15 @@ def place_bin(
         See :mod:`reachmap.errors`.
     """
     choice = choice or PlacementChoice()
-    _check(choice, output, picture, run)
+    _check(choice)
+    check_picture(picture, "--picture")
+    check_outputs([output, picture], overwrite=run.overwrite, inputs=[workspace])
     clock = RunClock(workers=run.workers)
     workspace_map = read_workspace_map(workspace)
     loaded = cell_of_artefact(
         workspace_map.provenance, str(workspace), with_seed(overrides, seed)
     )
+    refuse_cell_files([output, picture], loaded)
     region = _region(loaded, workspace_map, choice)
     scene = Scene.build(loaded, with_bin=False)
     scene.require_free_scan_configuration()
@@ -172,9 +176,7 @@ def place_bin(
     return placement
 
 
-def _check(
-    choice: PlacementChoice, output: Path, picture: Path | None, run: RunOptions
-) -> None:
+def _check(choice: PlacementChoice) -> None:
     """Refuse wrong settings before the work is done."""
     if choice.rule not in RULES:
         raise SettingsError(f"rule {choice.rule!r}: expected {' or '.join(RULES)}")
@@ -183,13 +185,6 @@ def _check(
     unknown = sorted(set(choice.fixed) - set(AXES))
     if unknown:
         raise SettingsError(f"--fix {unknown[0]}: expected one of {', '.join(AXES)}")
-    check_output(output, overwrite=run.overwrite)
-    if picture is not None:
-        if picture.suffix not in PICTURES:
-            raise SettingsError(
-                f"--picture {picture}: expected a name that ends in .png or .svg"
-            )
-        check_output(picture, overwrite=run.overwrite)
 
 
 def _region(

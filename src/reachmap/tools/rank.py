@@ -10,10 +10,10 @@ from typing import Any
 
 from reachmap.errors import MapFileError, SettingsError
 from reachmap.maps import read_bin_map
-from reachmap.maps.bytes.publish import check_output, publish
+from reachmap.maps.bytes.publish import check_outputs, check_picture, publish
 from reachmap.maps.records import BinMap
 from reachmap.ranking.answers.explain import explanation, find_grasp
-from reachmap.ranking.answers.files import check_targets, joined, write_lists
+from reachmap.ranking.answers.files import joined, targets_of, write_lists
 from reachmap.ranking.answers.pipeline import pose_from_numbers, rank_list
 from reachmap.ranking.answers.ranked_list import (
     RankedList,
@@ -123,8 +123,11 @@ def rank(
     """
     settings, list_format = settings or RankSettings(), list_format or ListFormat()
     _check_request(sources, top, chart_top)
-    targets = check_targets(sources, output, overwrite=overwrite)
-    _check_chart(chart, overwrite=overwrite)
+    check_picture(chart, "--chart")
+    targets = targets_of(sources, output)
+    # A cell is a name or a file; either way it is not to be replaced.
+    inputs = [map_path, cell, *(source for source in sources if source != STDIN)]
+    check_outputs([*targets, chart], overwrite=overwrite, inputs=inputs)
     lists = [read_list(source, list_format) for source in sources]
     bin_map = read_bin_map(Path(map_path))
     if cell is not None:
@@ -160,13 +163,6 @@ def _check_request(
     for name, value in (("top", top), ("chart-top", chart_top)):
         if value is not None and value < 1:
             raise SettingsError(f"{name} must be 1 or more (got {value})")
-
-
-def _check_chart(chart: Path | None, *, overwrite: bool) -> None:
-    if chart is not None:
-        if chart.suffix not in (".png", ".svg"):
-            raise SettingsError(f"{chart}: a chart is a .png or an .svg")
-        check_output(chart, overwrite=overwrite)
 
 
 def _check_cell(

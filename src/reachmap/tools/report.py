@@ -6,8 +6,8 @@ from pathlib import Path
 
 from reachmap.cell.loaded import LoadedCell
 from reachmap.errors import CellError
-from reachmap.maps.bytes.publish import check_output, publish
-from reachmap.report.folder import RunFolder, read_run_folder
+from reachmap.maps.bytes.publish import check_outputs, publish
+from reachmap.report.folder import RunFolder, read_run_folder, usual_files
 from reachmap.report.page import report_page
 from reachmap.tools.options import cell_of_artefact
 
@@ -37,7 +37,7 @@ def report(folder: Path, *, output: Path, overwrite: bool = False) -> Path:
     OutputError
         The page exists or cannot be written.
     """
-    check_output(output, overwrite=overwrite)
+    check_outputs([output], overwrite=overwrite, inputs=usual_files(folder))
     run = read_run_folder(folder)
     page = report_page(run, _cell(run))
     publish(output, [page.encode()], overwrite=overwrite)

@@ -9,10 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from reachmap.core.scene import Scene
-from reachmap.disk import real_path
 from reachmap.errors import GraspListError, SettingsError
 from reachmap.maps import read_bin_map
-from reachmap.maps.bytes.publish import check_output, publish
+from reachmap.maps.bytes.publish import check_outputs, check_picture, publish
 from reachmap.maps.records import BinMap
 from reachmap.ranking.answers.pipeline import pose_from_numbers, rank_list
 from reachmap.ranking.answers.ranked_list import RankedList
@@ -21,6 +20,7 @@ from reachmap.ranking.lookup.ranker import Ranker
 from reachmap.ranking.lookup.settings import RankSettings
 from reachmap.runtime.progress import Progress
 from reachmap.tools.options import IN_PROCESS, RunOptions, cell_of_artefact
+from reachmap.tools.prologue import refuse_cell_files
 from reachmap.tools.rank import ListFormat, read_list
 from reachmap.validation.facts import facts_of
 from reachmap.validation.judgement import judge_list
@@ -31,7 +31,6 @@ from reachmap.validation.summary import Validation, summarise
 
 DEFAULT_ROLLS = 24
 MAX_ROLLS, MAX_REPEATS = 360, 255
-CHART_SUFFIXES = (".png", ".svg")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -113,10 +112,12 @@ def validate(
     """
     settings, pick = settings or RankSettings(), pick or PickOptions()
     _check_request(sources, random, pick, top)
-    _check_places(sources, map_path, output, chart, overwrite=run.overwrite)
+    check_picture(chart, "--chart")
+    check_outputs([output, chart], overwrite=run.overwrite, inputs=[map_path, *sources])
     bin_map = read_bin_map(Path(map_path))
     ranker = Ranker(bin_map)
     context = _context(bin_map, str(map_path), pick)
+    refuse_cell_files([output, chart], context.loaded)
     ranked = [
         _rank(source, ranker, settings, list_format or ListFormat())
         for source in sources
@@ -194,28 +195,6 @@ def _check_request(
             raise SettingsError(f"{name} must be 1 to {most} (got {value})")
     if top < 1:
         raise SettingsError(f"top must be 1 or more (got {top})")
-
-
-def _check_places(
-    sources: Sequence[str | Path],
-    map_path: str | Path,
-    output: Path | None,
-    chart: Path | None,
-    *,
-    overwrite: bool,
-) -> None:
-    """Refuse places before an hour of planning is spent."""
-    if chart is not None and chart.suffix not in CHART_SUFFIXES:
-        raise SettingsError(f"{chart}: a chart is a .png or an .svg")
-    inputs = {real_path(source) for source in (*sources, map_path)}
-    for target in (output, chart):
-        if target is None:
-            continue
-        if real_path(target) in inputs:
-            raise SettingsError(f"{target}: would replace an input")
-        check_output(target, overwrite=overwrite)
-    if output is not None and chart is not None and output == chart:
-        raise SettingsError(f"{output}: results and chart need two files")
 
 
 def _labels(ranked: Sequence[RankedList]) -> list[str]:

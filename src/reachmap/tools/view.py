@@ -11,10 +11,11 @@ from pathlib import Path
 
 from reachmap.cell.loading import SUFFIXES, LoadedCell, read_cell, shipped_cells
 from reachmap.errors import SettingsError
-from reachmap.maps.bytes.publish import check_output, publish
+from reachmap.maps.bytes.publish import check_outputs, publish
 from reachmap.maps.format.registry import Artefact, read_artefact
 from reachmap.maps.records import BinMap
 from reachmap.tools.options import cell_of_artefact
+from reachmap.tools.prologue import path_of_cell, refuse_cell_files
 from reachmap.view.engine import HOST, require_viewer, start_server, stop_server
 
 PORT = 8080
@@ -74,12 +75,14 @@ def view(
         The page exists, or the port is taken.
     """
     require_viewer()
-    if page is not None:
-        check_output(page, overwrite=overwrite)
+    check_outputs(
+        [page], overwrite=overwrite, inputs=[source, path_of_cell(str(source))]
+    )
     # Imported here: without the extra there is nothing to load the engines for.
     from reachmap.core.collision.solids import SolidCell
 
     record, loaded = _read(source)
+    refuse_cell_files([page], loaded)
     paths = _paths(record, test_grasps)
     cell = SolidCell.build(loaded)
     if page is not None:

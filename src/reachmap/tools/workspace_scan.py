@@ -16,7 +16,6 @@ from reachmap.maps import (
     RunClock,
     Status,
     WorkspaceMap,
-    check_output,
     write_workspace_map,
 )
 from reachmap.maps.summary.statistics import level_means
@@ -29,6 +28,11 @@ from reachmap.scans.workspace_per_frame import per_frame_work, plan_frames
 from reachmap.scans.workspace_results import assemble_workspace_map
 from reachmap.scans.workspace_roadmap import connect_survey, results_of_connection
 from reachmap.tools.options import IN_PROCESS, RunOptions, with_seed
+from reachmap.tools.prologue import (
+    check_scan_output,
+    path_of_cell,
+    refuse_cell_files,
+)
 
 if TYPE_CHECKING:
     from reachmap.cell.loading import LoadedCell
@@ -82,7 +86,9 @@ def workspace_scan(
             "--shard splits the per-frame method; the roadmap method looks at all "
             "frames together (leave out --shard, or add --method per-frame)"
         )
+    check_scan_output(output, run, [path_of_cell(cell)])
     loaded = read_cell(cell, with_seed(overrides, seed))
+    refuse_cell_files([output], loaded)
     scene = Scene.build(loaded, with_bin=with_bin)
     scene.require_free_scan_configuration()
     document = scan_document(
@@ -100,7 +106,6 @@ def workspace_scan(
             progress=Progress("workspace-scan", quiet=run.quiet),
         )
         return outcome.artefact  # type: ignore[no-any-return]
-    check_output(output, overwrite=run.overwrite)
     workspace = _scan_by_roadmap(scene, document, run)
     write_workspace_map(output, workspace, overwrite=run.overwrite)
     return workspace

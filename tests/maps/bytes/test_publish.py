@@ -2,6 +2,10 @@
 
 import errno
 import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -47,7 +51,7 @@ def test_overwrite_replaces_it(tmp_path: Path) -> None:
         ("missing/p.h5", "the folder .*missing does not exist"),
         ("folder", "is a folder; name a file"),
         ("file/p.h5", "cannot be written|does not exist"),
-        ("x" * 300, "cannot be written"),
+        ("x" * 300, "too long; the limit is 231 bytes"),
     ],
 )
 def test_impossible_places_are_refused(tmp_path: Path, name: str, message: str) -> None:
@@ -122,3 +126,78 @@ def test_a_record_that_breaks_the_format_is_not_written(tmp_path: Path) -> None:
     with pytest.raises(EngineError, match=r"p\.h5: not written, score goes above 100"):
         write_placement(tmp_path / "p.h5", record)
     assert names(tmp_path) == []
+
+
+def test_a_file_that_appears_meanwhile_is_kept(tmp_path: Path) -> None:
+    """Whoever came first has the name, also when the place was free at the check."""
+    path = tmp_path / "o.h5"
+
+    def chunks() -> Iterator[bytes]:
+        yield b"mine"
+        path.write_bytes(b"precious")
+
+    with pytest.raises(OutputError, match=r"o\.h5: exists already"):
+        publish(path, chunks())
+    assert path.read_bytes() == b"precious"
+    assert names(tmp_path) == ["o.h5"]
+
+
+def test_without_links_a_file_is_renamed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """On file systems that have none; a file that is there is kept all the same."""
+
+    def link(*_: object) -> None:
+        raise PermissionError(errno.EPERM, "Operation not permitted")
+
+    monkeypatch.setattr(os, "link", link)
+    publish(tmp_path / "o.h5", [b"mine"])
+    with pytest.raises(OutputError, match="exists already"):
+        publish(tmp_path / "o.h5", [b"other"])
+    assert (tmp_path / "o.h5").read_bytes() == b"mine"
+
+
+KILLED = """
+import os, pathlib, signal, sys
+from reachmap.maps.bytes import publish
+
+def kill(*_):
+    os.kill(os.getpid(), signal.SIGKILL)
+
+if sys.argv[2] == "fsync":
+    os.fsync = kill
+elif sys.argv[2] == "unlink":
+    pathlib.Path.unlink = kill
+else:
+    os.link = kill
+publish.publish(pathlib.Path(sys.argv[1]), [b"new" * 1000])
+"""
+
+
+@pytest.mark.parametrize("step", ["fsync", "link", "unlink"])
+def test_what_a_killed_run_left_is_taken_over(tmp_path: Path, step: str) -> None:
+    """At most one file stays, however many runs are killed; the next removes it."""
+    path = tmp_path / "o.h5"
+    for _ in range(3):
+        done = subprocess.run([sys.executable, "-c", KILLED, path, step], check=False)
+        assert done.returncode in (-signal.SIGKILL, 1)
+        assert len(set(names(tmp_path)) - {"o.h5"}) == 1
+    published = path.read_bytes() if path.exists() else None
+    assert published in (None, b"new" * 1000)
+    publish(path, [b"again"], overwrite=True)
+    assert names(tmp_path) == ["o.h5"]
+    assert path.read_bytes() == b"again"
+
+
+def test_two_writers_of_one_file_are_kept_apart(tmp_path: Path) -> None:
+    """The second is refused; the first does not notice."""
+    path = tmp_path / "o.h5"
+
+    def chunks() -> Iterator[bytes]:
+        with pytest.raises(OutputError, match="being written by another run"):
+            publish(path, [b"second"], overwrite=True)
+        yield b"first"
+
+    publish(path, chunks())
+    assert path.read_bytes() == b"first"
+    assert names(tmp_path) == ["o.h5"]

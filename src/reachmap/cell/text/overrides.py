@@ -15,6 +15,7 @@ from reachmap.cell.text.yaml_reader import (
     Place,
     parse_yaml,
 )
+from reachmap.disk import is_text, recorded_name
 from reachmap.errors import CellError
 
 MAX_OVERRIDES = 1000
@@ -32,7 +33,7 @@ def apply_overrides(
     if len(overrides) > MAX_OVERRIDES:
         raise CellError(f"--set: at most {MAX_OVERRIDES} assignments")
     for text in overrides:
-        place = Place(source=f"--set {text[:120]}")
+        place = Place(source=f"--set {recorded_name(text[:120])}")
         try:
             _apply(document, text, place, model)
         except _PathError as error:
@@ -49,6 +50,8 @@ class _PathError(ValueError):
 
 
 def _apply(document: Document, text: str, place: Place, model: type[BaseModel]) -> None:
+    if not is_text(text):
+        raise _PathError("expected UTF-8 text")
     path, separator, value_text = text.partition("=")
     if not separator or not path.strip():
         raise _PathError("expected key.path=value")

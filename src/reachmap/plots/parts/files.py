@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 from reachmap._typing import FloatArray
 from reachmap.errors import OutputError
-from reachmap.maps.bytes.publish import check_output, publish
+from reachmap.maps.bytes.publish import check_outputs, publish
 from reachmap.plots.parts.style import Format, figure_bytes
 
 
@@ -52,6 +52,7 @@ def write_all(
     kind: Format = "png",
     config_sha256: str,
     overwrite: bool = False,
+    inputs: Sequence[Path] = (),
 ) -> tuple[Path, ...]:
     """Write pictures and tables into a folder, which is made if it is missing.
 
@@ -73,8 +74,7 @@ def write_all(
         folder / f"{item.name}.{'csv' if isinstance(item, Table) else kind}"
         for item in items
     )
-    for path in paths:
-        check_output(path, overwrite=overwrite)
+    check_outputs(paths, overwrite=overwrite, inputs=inputs)
     for path, item in zip(paths, items, strict=True):
         if isinstance(item, Table):
             data = item.text.encode()

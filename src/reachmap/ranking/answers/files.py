@@ -5,16 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from reachmap.disk import is_folder, real_path
+from reachmap.disk import is_folder
 from reachmap.errors import OutputError, SettingsError
-from reachmap.maps.bytes.publish import check_output, publish
+from reachmap.maps.bytes.publish import publish
 from reachmap.ranking.lists.reading import STDIN
 
 
-def check_targets(
-    sources: Sequence[str | Path], output: Path | None, *, overwrite: bool
-) -> list[Path]:
-    """Name the file of each list, or the one file of all, before any work is done.
+def targets_of(sources: Sequence[str | Path], output: Path | None) -> list[Path]:
+    """Name the file of each list, or the one file of all.
 
     Parameters
     ----------
@@ -23,31 +21,23 @@ def check_targets(
     output : Path or None
         A folder takes ``NAME.ranked.json`` for each list; of several lists, a name
         without suffix is a folder that is made. Any other name is one file.
-    overwrite : bool
 
     Raises
     ------
     OutputError, SettingsError
-        A file exists, cannot be written, is the supplied list, or would be written
-        twice.
+        The folder cannot be made, or two lists have one name.
     """
     if output is None:
         return []
-    if is_folder(output) or (len(sources) > 1 and not output.suffix):
-        try:
-            output.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise OutputError(f"{output}: cannot be made: {error.strerror}") from error
-        targets = [output / _ranked_name(source) for source in sources]
-    else:
-        targets = [output]
+    if not is_folder(output) and (len(sources) == 1 or output.suffix):
+        return [output]
+    targets = [output / _ranked_name(source) for source in sources]
     if len(set(targets)) < len(targets):
         raise SettingsError("two lists have one name; rank them one after the other")
-    supplied = {real_path(source) for source in sources if str(source) != STDIN}
-    for target in targets:
-        if real_path(target) in supplied:
-            raise OutputError(f"{target}: would replace the supplied list")
-        check_output(target, overwrite=overwrite)
+    try:
+        output.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"{output}: cannot be made: {error.strerror}") from error
     return targets
 
 

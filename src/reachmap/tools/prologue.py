@@ -1,0 +1,67 @@
+"""What a tool does first: see that its results have a place, before any work."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
+from pathlib import Path
+
+from reachmap.cell.loaded import LoadedCell
+from reachmap.cell.loading import cell_path
+from reachmap.cell.text.data import text_at
+from reachmap.cell.text.yaml_reader import parse_yaml
+from reachmap.disk import is_there, real_path
+from reachmap.errors import CellError
+from reachmap.maps import check_output, check_outputs
+from reachmap.runtime.journal.journal import journal_path
+from reachmap.tools.options import RunOptions
+
+
+def check_scan_output(
+    output: Path, run: RunOptions, inputs: Sequence[str | Path | None]
+) -> None:
+    """Refuse a place for a scan, as far as that needs no scene.
+
+    An output with a journal beside it may be what an earlier part of this run has
+    published; whether it is, the run itself finds out.
+    """
+    journal = journal_path(output, run.shard)
+    resumes = is_there(journal) and not run.restart
+    target = output if run.shard is None else journal
+    check_outputs([target], overwrite=run.overwrite or resumes, inputs=inputs)
+
+
+def path_of_cell(name_or_path: str | None) -> Path | None:
+    """File of a cell, shipped or not; None where no cell is named or there is none."""
+    with suppress(CellError):
+        return None if name_or_path is None else cell_path(name_or_path)
+    return None
+
+
+def refuse_cell_files(outputs: Iterable[Path | None], loaded: LoadedCell) -> None:
+    """Refuse outputs that would replace what a cell is made from.
+
+    Raises
+    ------
+    OutputError
+        An output is its URDF, SRDF, joint limits or a mesh.
+    """
+    for output in outputs:
+        if output is not None and is_there(real_path(output)):
+            check_output(output, overwrite=True, inputs=_files_of(loaded))
+
+
+def _files_of(loaded: LoadedCell) -> Iterator[Path]:
+    robot = loaded.cell.robot
+    # The joint limits are merged into the cell, which then names no file of them.
+    with suppress(CellError):
+        text = parse_yaml(loaded.text, loaded.source).data
+        for name in ("urdf", "srdf", "joint_limits"):
+            reference = text_at(text, "robot", name)
+            if reference:
+                yield loaded.resolve(reference)
+    for reference in (robot.urdf, robot.srdf):
+        with suppress(CellError):
+            if reference:
+                yield loaded.resolve(reference)
+    yield from loaded.mesh_paths.values()
