@@ -44,7 +44,7 @@ HOMES = {
     "click": ("reachmap.cli",),
     "viser": ("reachmap.view.",),
     "trimesh": ("reachmap.view.",),
-    "xacrodoc": ("reachmap.cell.",),
+    "xacro": ("reachmap.cell.",),
     "ruamel": ("reachmap.cell.text.", "reachmap.ranking.lists."),
     "simpleeval": ("reachmap.cell.text.expressions",),
     "distributed": ("reachmap.runtime.",),

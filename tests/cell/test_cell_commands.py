@@ -10,7 +10,7 @@ from click.testing import CliRunner, Result
 
 from reachmap.cell.loading import read_cell, shipped_cells
 from reachmap.cli import group
-from reachmap.errors import CellError
+from reachmap.errors import CellError, SceneError
 from reachmap.tools.check import check, shape_text
 
 UR5 = "package://example-robot-data/robots/ur_description/urdf/ur5_robot.urdf"
@@ -244,9 +244,54 @@ def test_the_starter_is_refused_by_name_only(tmp_path: Path) -> None:
         read_cell(str(tmp_path / "c.yaml"))
 
 
-def test_a_joint_and_a_link_of_one_name_are_named(tmp_path):
-    """The Z1's fixed joint gripperStator has a link's name; the message says which."""
-    urdf = "package://example-robot-data/robots/z1_description/urdf/z1.urdf"
-    done = run("new-cell", urdf, "-o", str(tmp_path / "z1.yaml"))
-    assert "'gripperStator': names of a joint and of a link" in done.output
-    assert "rename the joint" in done.output
+NAMESAKES = (
+    '<robot name="n"><link name="base"/><link name="{0}"/><link name="tool"/>'
+    '<link name="{1}"/>{{}}</robot>'
+)
+TURN = (
+    '<joint name="{}" type="revolute"><parent link="{}"/><child link="{}"/>'
+    '<origin xyz="0.3 0 0"/><axis xyz="0 1 0"/>'
+    '<limit lower="-2" upper="2" velocity="1" effort="1"/></joint>'
+)
+
+
+def test_joints_and_links_may_share_names(tmp_path: Path) -> None:
+    """A URDF has two name spaces: the TCP is where it is with other names."""
+
+    def tcp(arm: str, finger: str) -> tuple[float, ...]:
+        joints = (
+            TURN.format(arm, "base", "arm")
+            + TURN.format("elbow", "arm", "tool")
+            + TURN.format(finger, "tool", "finger")
+        )
+        urdf = NAMESAKES.format("arm", "finger").format(joints)
+        (tmp_path / "n.urdf").write_text(urdf)
+        output = tmp_path / "n.yaml"
+        run("new-cell", str(tmp_path / "n.urdf"), "--tip", "tool", "-o", str(output),
+            "--overwrite")  # fmt: skip
+        q = f"scan_configuration.q_deg={{{arm}: 30, elbow: 45}}"
+        locked = f"robot.locked_joints_deg={{{finger}: 10}}"
+        body = "{name: b, attach_to: arm, shape: {sphere: {radius: 0.01}}}"
+        answer = check(str(output), [q, locked, f"bodies=[{body}]"])
+        assert [row.name for row in answer.joints] == [arm, "elbow"]
+        return answer.tcp_at_scan_m
+
+    assert tcp("arm", "finger") == tcp("arm", "tool") == tcp("j1", "j3")
+
+
+def test_infinite_limits_count_as_not_given(tmp_path: Path) -> None:
+    """Both: the joint turns without end. One: the cell must say, and is obeyed."""
+    text = NAMESAKES.format("arm", "finger").format(
+        TURN.format("a", "base", "arm").replace('"-2" upper="2"', '"-inf" upper="INF"')
+        + TURN.format("b", "arm", "tool").replace('"2"', '"inf"')
+        + TURN.format("c", "tool", "finger").replace('effort="1"', 'effort="inf"')
+    )
+    (tmp_path / "n.urdf").write_text(text)
+    output = tmp_path / "n.yaml"
+    made = run("new-cell", str(tmp_path / "n.urdf"), "-o", str(output))
+    assert made.exit_code == 0, made.stderr
+    rows = {row.name: (row.lower, row.upper) for row in check(str(output)).joints}
+    assert rows["a"] == (-180.0, 180.0)
+    assert rows["b"] == pytest.approx((-114.59, 180.0), abs=0.01)
+    with pytest.raises(SceneError, match=r"position_deg: joint 'b' has no limit"):
+        check(str(output), ["robot.limits.position_deg={a: [-90, 90]}"])

@@ -75,7 +75,10 @@ class LoadedCell:
     @property
     def resolver(self) -> Resolver:
         """Looks up references of the cell file."""
-        return Resolver(directory=self.directory, packages=self.cell.resources.packages)
+        plain = Resolver(
+            directory=self.directory, packages=self.cell.resources.packages
+        )
+        return plain.around(self.cell.robot.urdf)
 
     @property
     def package_dirs(self) -> tuple[str, ...]:

@@ -84,8 +84,10 @@ def guess_tip(robot: UrdfDescription, base: str) -> str:
 def middle_position(joint: UrdfJoint) -> float:
     """Zero if the joint may be there, else the middle of its range [rad or m]."""
     low, high = joint.lower, joint.upper
-    if low is None or high is None or low < 0.0 < high:
+    if (low is None or low < 0.0) and (high is None or high > 0.0):
         return 0.0
+    if low is None or high is None:
+        return low or high or 0.0
     return (low + high) / 2.0
 
 
@@ -173,7 +175,7 @@ def approach_axis(tip: str) -> str:
 
 def _limits(c: StarterChoices) -> list[str]:
     slow = [j.name for j in c.joints if not j.velocity or j.velocity <= 0]
-    unbounded = [j.name for j in c.joints if j.lower is None or j.upper is None]
+    unbounded = [j for j in c.joints if j.lower is None or j.upper is None]
     lines = ["  limits:"]
     if slow:
         lines.append("    # GUESS: the URDF has no velocity for these joints.")
@@ -183,10 +185,22 @@ def _limits(c: StarterChoices) -> list[str]:
         lines.append("    # velocity_rad_s: 2.0")
     lines.append("    acceleration_rad_s2: 5.0   # GUESS: a URDF cannot hold them")
     if unbounded:
-        table = {name: [-180.0, 180.0] for name in unbounded}
-        lines.append("    # GUESS: these joints turn without end in the URDF.")
+        table = {joint.name: _range(joint) for joint in unbounded}
+        lines.append("    # GUESS: the URDF sets no end to these joints.")
         lines.append(f"    position_deg: {scalar(table)}")
     return lines
+
+
+def _range(joint: UrdfJoint) -> list[float]:
+    """Range for a joint that lacks a limit: a turn, or two metres [deg or m]."""
+    widest = 180.0 if _turns(joint) else 1.0
+    low = -widest if joint.lower is None else user_value(joint, joint.lower)
+    high = widest if joint.upper is None else user_value(joint, joint.upper)
+    if joint.upper is None and low >= widest:
+        high = low + 2 * widest
+    if joint.lower is None and high <= -widest:
+        low = high - 2 * widest
+    return [round(low, 3), round(high, 3)]
 
 
 def _bin_numbers(c: StarterChoices) -> tuple[list[float], list[float], float]:

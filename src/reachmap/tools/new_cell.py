@@ -123,7 +123,7 @@ def _first_choices(
         path = resolver.resolve(reference)
     except NotFoundError as error:
         raise SettingsError(str(error)) from None
-    robot = parse_urdf(robot_text(path, {}, resolver), path.name)
+    robot = parse_urdf(robot_text(path, {}, resolver).text, path.name)
     for link in (base, tip):
         if link is not None and link not in robot.links:
             hint = did_you_mean(link, robot.links)

@@ -189,7 +189,7 @@ def xacro_cell(tmp_path: Path) -> Path:
 
 def test_xacro_is_expanded_with_its_arguments(xacro_cell: Path) -> None:
     """The text that is kept is the expanded one, without paths of this machine."""
-    pytest.importorskip("xacrodoc")
+    pytest.importorskip("xacro")
     loaded = read_cell(str(xacro_cell))
     assert 'xyz="0.25 0 0"' in loaded.urdf
     assert str(xacro_cell.parent) not in loaded.urdf
@@ -199,9 +199,30 @@ def test_xacro_is_expanded_with_its_arguments(xacro_cell: Path) -> None:
     assert longer.sha256 != loaded.sha256
 
 
+@pytest.mark.parametrize(
+    ("key", "hint"),
+    [("lenght", "did you mean 'length'"), ("x", "known: length")],
+)
+def test_an_unknown_xacro_argument_is_a_mistake(
+    xacro_cell: Path, key: str, hint: str
+) -> None:
+    """It would be left unused, and the robot be another than was meant."""
+    pytest.importorskip("xacro")
+    with pytest.raises(CellError, match=rf"xacro_args\.{key}: no such arg.*{hint}"):
+        read_cell(str(xacro_cell), [f"robot.xacro_args.{key}=2"])
+
+
+def test_a_plain_urdf_takes_no_xacro_arguments(xacro_cell: Path) -> None:
+    """Arguments that nothing reads are a mistake, too."""
+    urdf = XACRO.replace("xacro:", "").replace("${half}", "0")
+    (xacro_cell.parent / "toy.urdf").write_text(urdf)
+    with pytest.raises(CellError, match=r"xacro_args\.length: .*the URDF takes none"):
+        read_cell(str(xacro_cell), ["robot.urdf=toy.urdf"])
+
+
 def test_a_xacro_that_does_not_expand_is_one_line(xacro_cell: Path) -> None:
     """An expression that fails is reported at the reference."""
-    pytest.importorskip("xacrodoc")
+    pytest.importorskip("xacro")
     broken = XACRO.replace("${half}", "${missing_name}")
     (xacro_cell.parent / "toy.urdf.xacro").write_text(broken)
     with pytest.raises(CellError, match=r"cell\.yaml:6:9: robot\.urdf: .*missing_name"):
@@ -212,7 +233,7 @@ def test_without_the_extra_the_message_names_it(
     xacro_cell: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The missing package is an error of its own kind, with the command to install."""
-    monkeypatch.setitem(sys.modules, "xacrodoc", None)
+    monkeypatch.setitem(sys.modules, "xacro", None)
     with pytest.raises(
         MissingExtraError, match=r"pip install 'reachmap-cells\[xacro\]"
     ):

@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from reachmap._typing import FloatArray
 from reachmap.cell.files.joint_limits import MoveItLimits, parse_joint_limits
 from reachmap.cell.files.meshes import MeshError, mesh_size
-from reachmap.cell.files.resources import NotFoundError, Resolver, search_folders
+from reachmap.cell.files.resources import NotFoundError, Resolver
 from reachmap.cell.files.srdf import SrdfDescription, parse_srdf
 from reachmap.cell.files.urdf import MAX_URDF_BYTES, UrdfDescription, parse_urdf
+from reachmap.cell.files.xacro import Expansion, expand_xacro
+from reachmap.cell.files.xml_text import read_xml
 from reachmap.cell.text.data import at, entries, text_at
+from reachmap.cell.text.messages import did_you_mean
 from reachmap.cell.text.yaml_reader import (
     MAX_TEXT_BYTES,
     Document,
@@ -22,51 +25,7 @@ from reachmap.cell.text.yaml_reader import (
     read_text,
 )
 from reachmap.disk import is_folder
-from reachmap.errors import CellError, MissingExtraError
-
-
-def expand_xacro(path: Path, arguments: Mapping[str, str], resolver: Resolver) -> str:
-    """Expand a xacro file.
-
-    A xacro file is a program (its ``${…}`` are Python expressions): expand only those
-    you trust. ``$(find NAME)`` looks where ``package://NAME`` does.
-
-    Raises
-    ------
-    MissingExtraError
-        xacrodoc is not installed.
-    CellError
-        The file does not expand.
-    """
-    try:
-        from xacrodoc import XacroDoc, packages
-    except ImportError:
-        raise MissingExtraError(
-            f"{path}: xacro files need the extra [xacro]; "
-            "install it with: pip install 'reachmap-cells[xacro]'"
-        ) from None
-    packages.reset()
-    packages.look_in([str(folder) for folder in search_folders() if is_folder(folder)])
-    packages.update_package_cache(
-        {
-            name: str(resolver.directory / folder)
-            for name, folder in resolver.packages.items()
-        }
-    )
-    try:
-        document = XacroDoc.from_file(
-            str(path), subargs=dict(arguments), resolve_packages=False
-        )
-        # Not to_urdf_string(): it would turn relative mesh paths into paths of this
-        # machine, and the text would not be the same elsewhere.
-        return str(document.dom.toprettyxml(indent="  "))
-    except Exception as error:  # xacro raises whatever its expressions raise
-        lines = str(error).strip().splitlines()
-        reason = lines[0] if lines else type(error).__name__
-        raise CellError(f"{path}: xacro cannot be expanded: {reason}") from None
-    finally:
-        packages.reset()
-
+from reachmap.errors import CellError
 
 MAX_MESH_BYTES = 100_000_000
 
@@ -86,6 +45,7 @@ class CellFiles:
     mesh_paths: dict[str, Path] = field(default_factory=dict)
     files_sha256: dict[str, str] = field(default_factory=dict)
     mesh_sizes: dict[str, FloatArray] = field(default_factory=dict)
+    expansions: list[Expansion] = field(default_factory=list)
 
     def add_mesh(self, key: str, path: Path) -> None:
         """Record a mesh by its key, with its size and the sha256 of its bytes."""
@@ -114,6 +74,7 @@ def read_files(document: Document, directory: Path) -> CellFiles:
     files = CellFiles(resolver=Resolver(directory=directory, packages=folders))
     _read_urdf(document, files)
     _read_srdf(document, files)
+    _check_xacro_args(document, files)
     _read_joint_limits(document, files)
     _find_urdf_meshes(document, files)
     _find_body_meshes(document, files)
@@ -136,6 +97,7 @@ def stored_files(document: Document, *, urdf: str, srdf: str) -> CellFiles:
         reference = text_at(document.data, "robot", "urdf") or ""
         path, root = files.resolver.resolve_robot(reference)
         files.urdf_folder, files.urdf_root = path.parent, root
+        files.resolver = replace(files.resolver, urdf_folder=path.parent)
     except NotFoundError:
         # The text is at hand; only meshes relative to it would be missing.
         files.urdf_folder = files.urdf_root = Path.cwd()
@@ -159,11 +121,14 @@ def compare_hashes(
             )
 
 
-def robot_text(path: Path, arguments: Mapping[str, str], resolver: Resolver) -> str:
+def robot_text(
+    path: Path, arguments: Mapping[str, str], resolver: Resolver
+) -> Expansion:
     """Text of a URDF or SRDF file, xacro expanded."""
     if path.suffix == ".xacro":
         return expand_xacro(path, arguments, resolver)
-    return read_text(path, limit=MAX_URDF_BYTES)
+    text = read_xml(path, limit=MAX_URDF_BYTES)
+    return Expansion(text=text, arguments=(), packages={}, warnings=())
 
 
 def body_key(name: str, reference: str) -> str:
@@ -184,11 +149,30 @@ def _read_urdf(document: Document, files: CellFiles) -> None:
         return
     try:
         path, root = files.resolver.resolve_robot(reference)
-        files.urdf = robot_text(path, _xacro_args(document), files.resolver)
+        files.resolver = replace(files.resolver, urdf_folder=path.parent)
+        files.urdf = _text(path, document, files)
         files.urdf_folder, files.urdf_root = path.parent, root
         files.robot = parse_urdf(files.urdf, path.name)
     except (NotFoundError, CellError) as error:
         _add(document, location, error)
+
+
+def _text(path: Path, document: Document, files: CellFiles) -> str:
+    expansion = robot_text(path, _xacro_args(document), files.resolver)
+    files.expansions.append(expansion)
+    return expansion.text
+
+
+def _check_xacro_args(document: Document, files: CellFiles) -> None:
+    """Add a mistake for every argument that no file declares or uses."""
+    if files.robot is None:
+        return
+    known = [name for e in files.expansions for name in e.arguments]
+    for name in _xacro_args(document):
+        if name not in known:
+            hint = did_you_mean(name, known) or "the URDF takes none"
+            location = ("robot", "xacro_args", name)
+            document.add(location, f"no such argument; {hint}", of_key=True)
 
 
 def _xacro_args(document: Document) -> Mapping[str, str]:
@@ -208,7 +192,7 @@ def _read_srdf(document: Document, files: CellFiles) -> None:
         return
     try:
         path = files.resolver.resolve(reference)
-        files.srdf = robot_text(path, _xacro_args(document), files.resolver)
+        files.srdf = _text(path, document, files)
         files.srdf_description = parse_srdf(files.srdf, path.name, files.robot)
     except (NotFoundError, CellError) as error:
         _add(document, location, error)

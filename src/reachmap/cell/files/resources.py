@@ -10,19 +10,29 @@ A reference is resolved only where the cell says:
   must lie in that root, in the cell's folder or in a package folder.
 
 Packages are looked up in ``resources.packages`` of the cell,
-``$REACHMAP_PACKAGE_PATH``, ``$ROS_PACKAGE_PATH``, ``share`` of each entry of
-``$AMENT_PREFIX_PATH``, the data of the installed ``example-robot-data`` distribution,
-and the cells shipped with reachmap.
+``$REACHMAP_PACKAGE_PATH``, around the URDF (the package it lies in and those beside it,
+see :mod:`reachmap.cell.files.packages`), above the cell, in ``$ROS_PACKAGE_PATH``,
+``share`` of each entry of ``$AMENT_PREFIX_PATH``, the data of the installed
+``example-robot-data`` distribution, and the cells shipped with reachmap.
 """
 
 from __future__ import annotations
 
+import dataclasses
 import os
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from importlib import metadata, resources
 from pathlib import Path
+from urllib.parse import unquote
 
+from reachmap.cell.files.packages import (
+    LEVELS,
+    own_package,
+    package_above,
+    package_name,
+    package_nearby,
+)
 from reachmap.disk import is_file, is_folder
 
 SCHEME = "package://"
@@ -49,18 +59,24 @@ def data_folder() -> Path | None:
 
 def search_folders() -> list[Path]:
     """Folders that hold packages, in the order they are tried."""
+    return [*_own_search_path(), *_ros_search_path()]
 
-    def entries(variable: str) -> Iterator[Path]:
-        for entry in os.environ.get(variable, "").split(os.pathsep):
-            if entry:
-                yield Path(entry)
 
-    folders = [*entries("REACHMAP_PACKAGE_PATH"), *entries("ROS_PACKAGE_PATH")]
-    folders += [prefix / "share" for prefix in entries("AMENT_PREFIX_PATH")]
+def _own_search_path() -> list[Path]:
+    return list(_entries("REACHMAP_PACKAGE_PATH"))
+
+
+def _ros_search_path() -> list[Path]:
+    folders = list(_entries("ROS_PACKAGE_PATH"))
+    folders += [prefix / "share" for prefix in _entries("AMENT_PREFIX_PATH")]
     data = data_folder()
-    if data is not None:
-        folders.append(data)
-    return folders
+    return folders if data is None else [*folders, data]
+
+
+def _entries(variable: str) -> Iterator[Path]:
+    for entry in os.environ.get(variable, "").split(os.pathsep):
+        if entry:
+            yield Path(entry)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -73,31 +89,43 @@ class Resolver:
         Folder of the cell file.
     packages : mapping
         ``resources.packages`` of the cell: package name to folder.
+    urdf_folder : Path, optional
+        Folder of the URDF, around which packages are looked for, too.
     """
 
     directory: Path
     packages: Mapping[str, str] = field(default_factory=dict)
+    urdf_folder: Path | None = None
+
+    def around(self, urdf: str) -> Resolver:
+        """Copy that looks around the URDF, too, if the URDF can be found."""
+        try:
+            return dataclasses.replace(self, urdf_folder=self.resolve(urdf).parent)
+        except NotFoundError:
+            return self
 
     def package_folders(self, name: str) -> tuple[list[Path], list[Path]]:
         """Existing folders of a package, and all places tried."""
         tried = []
         if name in self.packages:
             tried.append(self.directory / self.packages[name])
-        for folder in search_folders():
-            tried.append(folder / name)
-            # A search path may name the package itself, as ROS 1 allows.
-            if folder.name == name:
-                tried.append(folder)
+        tried += _in_folders(name, _own_search_path())
+        for place in filter(None, (self.urdf_folder, self.directory)):
+            tried += package_above(name, _normal(place))
+        tried += _in_folders(name, _ros_search_path())
         if name == SHIPPED:
             tried.append(shipped_folder())
-        return [folder for folder in tried if is_folder(folder)], tried
+        found = [folder for folder in tried if is_folder(folder)]
+        if not found and self.urdf_folder is not None:
+            found = package_nearby(name, _normal(self.urdf_folder))
+        return found, tried
 
     def resolve(self, reference: str) -> Path:
         """Absolute path of a file named in the cell file; NotFoundError if none."""
         if reference.startswith(SCHEME):
             return self._in_package(reference)[0]
-        path = Path(_without_file_scheme(reference)).expanduser()
-        return _existing(reference, [self.directory / path])
+        paths = [Path(text).expanduser() for text in _spellings(reference)]
+        return _existing(reference, [self.directory / path for path in paths])
 
     def resolve_robot(self, reference: str) -> tuple[Path, Path]:
         """Path of the URDF, and the root that its relative references stay in."""
@@ -105,8 +133,12 @@ class Resolver:
             return self._in_package(reference)
         path = self.resolve(reference)
         folder = _normal(self.directory)
-        root = folder if path.is_relative_to(folder) else path.parent.parent
-        return path, root
+        above = path.parent.parent
+        root = folder if path.is_relative_to(folder) else above
+        package = own_package(path.parent)
+        # A package far above is a project that holds robots, rather than a robot.
+        near = package is not None and package in path.parents[:LEVELS]
+        return path, package if near and root.is_relative_to(package) else root
 
     def resolve_from_urdf(self, reference: str, folder: Path, root: Path) -> Path:
         """Absolute path of a file named in a URDF in ``folder``."""
@@ -117,52 +149,90 @@ class Resolver:
             raise NotFoundError(
                 f"{reference!r}: unknown scheme {scheme[:20]!r} (package:// or file://)"
             )
-        path = _normal(folder / _without_file_scheme(reference))
+        paths = [_normal(folder / text) for text in _spellings(reference)]
         allowed = [root, self.directory, *search_folders()]
         allowed += [self.directory / folder for folder in self.packages.values()]
-        if not any(path.is_relative_to(_normal(place)) for place in allowed):
+        within = [
+            path
+            for path in paths
+            if any(path.is_relative_to(_normal(place)) for place in allowed)
+            or self._in_known_package(path)
+        ]
+        if not within:
             raise NotFoundError(
                 f"{reference!r}: leads out of {root}; "
                 "add its folder to resources.packages"
             )
-        return _existing(reference, [path])
+        return _existing(reference, within)
+
+    def _in_known_package(self, path: Path) -> bool:
+        """Whether a path lies in a package that its name leads to, too."""
+        package = own_package(path.parent)
+        if package is None:
+            return False
+        found, _ = self.package_folders(package_name(package) or "")
+        return package in map(_normal, found)
 
     def _in_package(self, reference: str) -> tuple[Path, Path]:
         """File and package folder of a ``package://`` reference."""
         name, _, rest = reference.removeprefix(SCHEME).partition("/")
         if not name or not rest:
             raise NotFoundError(f"{reference!r}: expected package://NAME/PATH")
-        folders, tried = self.package_folders(name)
+        folders, _ = self.package_folders(name)
         if not folders:
-            places = ", ".join(str(folder) for folder in tried) or "nowhere"
-            raise NotFoundError(
-                f"package {name!r} of {reference!r} not found (tried {places}); "
-                f"{_remedy(name)}"
-            )
-        candidates = []
+            raise NotFoundError(self.missing_package(name, reference))
+        candidates = {}
         for folder in folders:
-            path = _normal(folder / rest)
-            if not path.is_relative_to(_normal(folder)):
-                raise NotFoundError(f"{reference!r}: leads out of the package")
-            candidates.append(path)
-        found = _existing(reference, candidates)
-        return found, _normal(folders[candidates.index(found)])
+            for text in dict.fromkeys((unquote(rest), rest)):
+                path = _normal(folder / text)
+                if not path.is_relative_to(_normal(folder)):
+                    raise NotFoundError(f"{reference!r}: leads out of the package")
+                candidates.setdefault(path, folder)
+        found = _existing(reference, list(candidates))
+        return found, _normal(candidates[found])
+
+    def missing_package(self, name: str, reference: str) -> str:
+        """Say where a package was looked for in vain, and what to do."""
+        _, tried = self.package_folders(name)
+        places = ", ".join(str(folder) for folder in tried) or "nowhere"
+        return (
+            f"package {name!r} of {reference!r} not found (tried {places}); "
+            f"{_remedy(name)}"
+        )
 
 
 def _remedy(name: str) -> str:
     if name == "example-robot-data":
         return "install it with: pip install example-robot-data"
-    return "add it to resources.packages of the cell or to $REACHMAP_PACKAGE_PATH"
+    return (
+        f"say where it is: {name}: FOLDER in resources.packages of the cell (new-cell "
+        f"--package {name}=FOLDER), or its parent in $REACHMAP_PACKAGE_PATH"
+    )
 
 
-def _without_file_scheme(reference: str) -> str:
-    return reference.removeprefix("file://")
+def _in_folders(name: str, folders: list[Path]) -> Iterator[Path]:
+    for folder in folders:
+        yield folder / name
+        # A search path may name the package itself, as ROS 1 allows.
+        if folder.name == name:
+            yield folder
+
+
+def _spellings(reference: str) -> tuple[str, ...]:
+    """Path of a reference; of a file:// one first with percent signs decoded."""
+    rest = reference.removeprefix("file://")
+    if rest == reference:
+        return (reference,)
+    rest = rest.removeprefix("localhost") if rest.startswith("localhost/") else rest
+    return tuple(dict.fromkeys((unquote(rest), rest)))
 
 
 def _normal(path: Path) -> Path:
     # Lexical, not resolve(): a symbolic link inside a package (a ROS workspace
     # built with --symlink-install) is the package's own business.
-    return Path(os.path.normpath(Path.cwd() / path))
+    text = os.path.normpath(Path.cwd() / path)
+    # POSIX leaves two leading slashes alone; file:///$(find NAME) makes them.
+    return Path("/" + text.lstrip("/") if text.startswith("//") else text)
 
 
 def _existing(reference: str, candidates: list[Path]) -> Path:

@@ -6,7 +6,8 @@ import math
 from dataclasses import dataclass
 from xml.etree import ElementTree
 
-from reachmap.cell.files.urdf import UrdfDescription, parse_xml
+from reachmap.cell.files.urdf import UrdfDescription
+from reachmap.cell.files.xml_text import parse_xml
 from reachmap.errors import CellError
 
 

@@ -12,10 +12,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from xml.etree import ElementTree
 
+from reachmap.cell.files.xml_text import parse_xml
 from reachmap.errors import CellError
 
 MAX_URDF_BYTES = 20_000_000
-MAX_ELEMENTS = 200_000
 MAX_LINKS = 2_000
 MOVING = ("revolute", "continuous", "prismatic")
 JOINT_TYPES = (*MOVING, "fixed", "floating", "planar")
@@ -97,25 +97,6 @@ class UrdfDescription:
         return tuple(link for link in self.links if link not in parents)
 
 
-def parse_xml(text: str, label: str) -> ElementTree.Element:
-    """Parse XML without document types, so that no entity can be declared."""
-    if "<!DOCTYPE" in text or "<!ENTITY" in text:
-        raise CellError(f"{label}: document type declarations are not accepted")
-    try:
-        root = ElementTree.fromstring(text)
-    except ElementTree.ParseError as error:
-        line, column = error.position
-        reason = str(error).split(":")[0]
-        raise CellError(
-            f"{label}:{line}:{column + 1}: not valid XML: {reason}"
-        ) from None
-    except ValueError as error:
-        raise CellError(f"{label}: not valid XML: {error}") from None
-    if sum(1 for _ in root.iter()) > MAX_ELEMENTS:
-        raise CellError(f"{label}: more than {MAX_ELEMENTS:,} XML elements")
-    return root
-
-
 def parse_urdf(text: str, label: str) -> UrdfDescription:
     """Read the structure of a URDF.
 
@@ -163,9 +144,9 @@ def _joint(element: ElementTree.Element, faults: list[str]) -> UrdfJoint:
     if limit is not None:
         velocity = _number(limit, "velocity", name, faults)
         if kind in ("revolute", "prismatic"):
-            lower = _number(limit, "lower", name, faults) or 0.0
-            upper = _number(limit, "upper", name, faults) or 0.0
-            if lower > upper:
+            lower = _bound(limit, "lower", name, faults)
+            upper = _bound(limit, "upper", name, faults)
+            if lower is not None and upper is not None and lower > upper:
                 faults.append(f"joint {name!r}: limit {lower:g} is above {upper:g}")
     elif kind in ("revolute", "prismatic"):
         faults.append(f"joint {name!r}: a {kind} joint needs <limit>")
@@ -191,12 +172,23 @@ def _number(
         value = float(text)
     except ValueError:
         value = math.nan
+    if math.isinf(value):
+        return None  # as good as not given
     if math.isfinite(value):
         return value
     faults.append(
         f"joint {joint!r}: {key}: expected a finite number (got {text[:40]!r})"
     )
     return None
+
+
+def _bound(
+    element: ElementTree.Element, key: str, joint: str, faults: list[str]
+) -> float | None:
+    """Position limit: 0 where the URDF omits it, None where it is infinite."""
+    if element.get(key) is None:
+        return 0.0
+    return _number(element, key, joint, faults)
 
 
 def _repeated(kind: str, names: list[str]) -> list[str]:

@@ -206,7 +206,9 @@ class _Builder:
         frame = (
             0
             if joint == ROOT
-            else self.robot.model.getFrameId(self.robot.model.names[joint])
+            else self.robot.model.getFrameId(
+                self.robot.model.names[joint], pin.FrameType.JOINT
+            )
         )
         index = self.geometry.addGeometryObject(
             pin.GeometryObject(name, joint, frame, placement, shape)

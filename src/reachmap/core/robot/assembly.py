@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -18,6 +17,7 @@ from reachmap.core.robot.urdf_joints import UrdfJoints
 from reachmap.errors import SceneError
 
 TCP_FRAME = "reachmap_tcp"
+JOINT_SUFFIX = " (joint)"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -158,9 +158,13 @@ def reduced_model(
     limits = merge_limits(ranges, cell)
     locked = [full.getJointId(n) for n in list(full.names)[1:] if n not in moving]
     try:
-        model = pin.buildReducedModel(full, locked, q_locked)
+        model = pin.buildReducedModel(_told_apart(full), locked, q_locked)
     except ValueError as error:
-        raise SceneError(_why_not_reduced(full, str(error))) from error
+        raise SceneError(f"robot.urdf: joints cannot be locked ({error})") from error
+    for joint, name in enumerate(model.names):
+        model.names[joint] = name.removesuffix(JOINT_SUFFIX)
+    for frame in model.frames:
+        frame.name = frame.name.removesuffix(JOINT_SUFFIX)
     if list(model.names)[1:] != list(moving):
         raise SceneError("robot.urdf: the joints from base to TCP are not one chain")
     model.lowerPositionLimit = limits.lower
@@ -168,17 +172,20 @@ def reduced_model(
     return model, limits
 
 
-def _why_not_reduced(full: Any, said: str) -> str:
-    # Fixed joints are frames, too, and no names of the model's joints.
-    names = Counter(frame.name for frame in full.frames)
-    shared = [name for name, count in names.items() if count > 1]
-    if not shared:
-        return f"robot.urdf: joints cannot be locked ({said})"
-    return (
-        f"robot.urdf: {', '.join(map(repr, shared))}: names of a joint and of a link, "
-        "which are told apart by name when other joints are locked; rename the joint "
-        "in a copy of the URDF"
-    )
+def _told_apart(full: Any) -> Any:
+    """Copy in which no joint shares its name with a link, which a URDF allows.
+
+    Pinocchio looks up the frames of joints by name alone when it locks any.
+    """
+    model = full.copy()
+    links = {f.name for f in full.frames if f.type == pin.FrameType.BODY}
+    for frame in model.frames:
+        if frame.name in links and frame.type != pin.FrameType.BODY:
+            frame.name += JOINT_SUFFIX
+    for joint, name in enumerate(full.names):
+        if name in links:
+            model.names[joint] = name + JOINT_SUFFIX
+    return model
 
 
 def add_tcp(model: Any, spec: RobotSpec) -> Any:

@@ -13,6 +13,7 @@ import numpy as np
 
 from reachmap._typing import FloatArray
 from reachmap.cell.model.cell import JointLimits
+from reachmap.core.robot.urdf_joints import UNBOUNDED
 from reachmap.errors import SceneError
 
 
@@ -105,8 +106,13 @@ def _position(
     if not bounds:  # a continuous joint that nobody bounds
         bounds.append((joint.lower, joint.upper))
     low, high = max(b[0] for b in bounds), min(b[1] for b in bounds)
-    if not (math.isfinite(low) and math.isfinite(high) and low < high):
-        unit = "rad" if turns else "m"
+    unit = "rad" if turns else "m"
+    if max(abs(low), abs(high)) >= UNBOUNDED:
+        problems.append(
+            f"robot.limits.position_deg: joint {joint.name!r} has no limit in the URDF "
+            f"(lower {low:.6g}, upper {high:.6g} {unit}); give it [low, high] here"
+        )
+    elif not (math.isfinite(low) and math.isfinite(high) and low < high):
         problems.append(
             f"robot.limits: joint {joint.name!r} has no range left "
             f"(lower {low:.6g}, upper {high:.6g} {unit})"

@@ -12,8 +12,12 @@ import xml.etree.ElementTree as ET
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from reachmap.cell.files.urdf import MOVING, parse_xml
+from reachmap.cell.files.urdf import MOVING
+from reachmap.cell.files.xml_text import parse_xml
 from reachmap.errors import SceneError
+
+# Stands in the engine's URDF for a bound that the robot's URDF does not give.
+UNBOUNDED = 1e300
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -63,6 +67,7 @@ def read_urdf_joints(urdf: str) -> UrdfJoints:
     if root.tag != "robot":
         raise SceneError(f"robot.urdf: expected a <robot> element, got <{root.tag}>")
     types: dict[str, str] = {}
+    changed = False
     mimics: dict[str, Mimic] = {}
     problems: list[str] = []
     for joint in root.findall("joint"):
@@ -74,12 +79,12 @@ def read_urdf_joints(urdf: str) -> UrdfJoints:
                 f"robot.urdf: joint {name!r} has type {kind!r}; "
                 f"only fixed, {', '.join(MOVING)} joints are supported"
             )
-        types[name] = kind
         mimics.update(_mimic_of(joint, name))
-        _bound_if_continuous(joint)
+        changed |= _drop_infinite(joint)
+        types[name] = joint.get("type", "")
+        changed |= _bound_if_continuous(joint)
     if problems:
         raise SceneError(problems)
-    changed = "continuous" in types.values()
     text = ET.tostring(root, encoding="unicode") if changed else urdf
     return UrdfJoints(text=text, types=types, mimics=mimics)
 
@@ -97,9 +102,38 @@ def _mimic_of(joint: ET.Element, name: str) -> Iterator[tuple[str, Mimic]]:
         )
 
 
-def _bound_if_continuous(joint: ET.Element) -> None:
+def _drop_infinite(joint: ET.Element) -> bool:
+    """Rewrite infinite numbers, which urdfdom refuses, as numbers not given.
+
+    A revolute joint without either bound becomes a continuous one; another bound that
+    is missing becomes ±UNBOUNDED. True if anything was rewritten.
+    """
+    rewritten = False
+    for part in (e for e in joint if e.tag in ("limit", "dynamics")):
+        for key in [k for k, text in part.items() if _is_infinite(text)]:
+            rewritten = True
+            sign = -1.0 if key == "lower" else 1.0
+            part.set(key, repr(sign * UNBOUNDED) if key in ("lower", "upper") else "0")
+    for part in joint.findall("safety_controller"):
+        if any(_is_infinite(text) for text in part.attrib.values()):
+            joint.remove(part)
+            rewritten = True
+    bounds = [(e.get("lower"), e.get("upper")) for e in joint.findall("limit")]
+    if rewritten and bounds == [(repr(-UNBOUNDED), repr(UNBOUNDED))]:
+        joint.set("type", joint.get("type", "").replace("revolute", "continuous"))
+    return rewritten
+
+
+def _is_infinite(text: str) -> bool:
+    try:
+        return math.isinf(float(text))
+    except ValueError:
+        return False
+
+
+def _bound_if_continuous(joint: ET.Element) -> bool:
     if joint.get("type") != "continuous":
-        return
+        return False
     joint.set("type", "revolute")
     limit = joint.find("limit")
     if limit is None:
@@ -107,3 +141,4 @@ def _bound_if_continuous(joint: ET.Element) -> None:
         limit = ET.SubElement(joint, "limit", effort="0", velocity="0")
     limit.set("lower", repr(-math.pi))
     limit.set("upper", repr(math.pi))
+    return True

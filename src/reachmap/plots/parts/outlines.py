@@ -17,7 +17,7 @@ from scipy.spatial import ConvexHull, QhullError
 
 from reachmap._typing import FloatArray
 from reachmap.cell.files.resources import SCHEME, NotFoundError, Resolver
-from reachmap.cell.files.urdf import parse_xml
+from reachmap.cell.files.xml_text import parse_xml
 from reachmap.cell.model.cell import BinSpec, Cell
 from reachmap.cell.model.fields import CylinderShape, Shape
 from reachmap.geometry import (
@@ -272,7 +272,7 @@ def _mesh_path(cell: Cell, reference: str) -> Path:
     """Path of a mesh that the URDF names; NotFoundError if it is not here."""
     resolver = Resolver(directory=Path(), packages=cell.resources.packages)
     if reference.startswith(SCHEME):
-        return resolver.resolve(reference)
+        return resolver.around(cell.robot.urdf).resolve(reference)
     urdf, root = resolver.resolve_robot(cell.robot.urdf)
     return resolver.resolve_from_urdf(reference, urdf.parent, root)
 
