@@ -137,8 +137,13 @@ class Resolver:
         root = folder if path.is_relative_to(folder) else above
         package = own_package(path.parent)
         # A package far above is a project that holds robots, rather than a robot.
-        near = package is not None and package in path.parents[:LEVELS]
-        return path, package if near and root.is_relative_to(package) else root
+        if (
+            package
+            and package in path.parents[:LEVELS]
+            and root.is_relative_to(package)
+        ):
+            root = package
+        return path, root
 
     def resolve_from_urdf(self, reference: str, folder: Path, root: Path) -> Path:
         """Absolute path of a file named in a URDF in ``folder``."""
@@ -181,7 +186,7 @@ class Resolver:
         folders, _ = self.package_folders(name)
         if not folders:
             raise NotFoundError(self.missing_package(name, reference))
-        candidates = {}
+        candidates: dict[Path, Path] = {}
         for folder in folders:
             for text in dict.fromkeys((unquote(rest), rest)):
                 path = _normal(folder / text)
