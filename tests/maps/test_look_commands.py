@@ -61,7 +61,7 @@ def test_info_of_a_workspace_map(folder: Path) -> None:
     answer = run("info", folder / "workspace.h5")
     assert answer.exit_code == 0
     text = answer.stdout
-    assert "workspace map, format 1.0, content" in text
+    assert "workspace map, format 1.1, content" in text
     assert "192 test frames, 40 squares on 2 levels, method roadmap" in text
     assert "  best  +0.00   50.00" in text
     assert "path found                      96 (50.0 %)" in text
@@ -151,7 +151,7 @@ def test_verify_names_whole_files(folder: Path) -> None:
     assert answer.exit_code == 0
     lines = answer.stdout.splitlines()
     assert [line.split(":")[0].rpartition("/")[2] for line in lines] == list(names)
-    assert all("whole; format 1.0" in line for line in lines)
+    assert all("whole; format 1.1" in line for line in lines)
 
 
 def test_verify_goes_on_after_a_damaged_file(folder: Path, tmp_path: Path) -> None:

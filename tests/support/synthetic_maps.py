@@ -17,7 +17,7 @@ import numpy as np
 from reachmap.cell.model.cell import BinScanSpec, BinSpec
 from reachmap.cell.model.orientations import ConeFamily
 from reachmap.geometry import quaternion_wxyz_from_rotation, yaw_transform
-from reachmap.maps.format.bin import path_lengths
+from reachmap.maps.format.checks import path_lengths
 from reachmap.maps.records import (
     NO_PAIR,
     BinMap,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import IntEnum
@@ -11,6 +10,16 @@ from typing import Any
 import numpy as np
 
 from reachmap._typing import BoolArray, CodeArray, FloatArray, IntArray
+from reachmap.maps.parts import (
+    ApproachTimes,
+    BestPaths,
+    Components,
+    Cycle,
+    Effort,
+    Margins,
+)
+from reachmap.maps.parts import PathStore as PathStore
+from reachmap.maps.parts import freeze as freeze
 from reachmap.sampling.lattice import Lattice, Stitching, pooled_percent, stitch
 
 NO_PAIR = -1
@@ -26,14 +35,6 @@ class Status(IntEnum):
     NO_PATH_FOUND = 4
     ERROR = 5
     APPROACH_BLOCKED = 6
-
-
-def freeze(record: Any) -> None:
-    """Make every array of a dataclass read-only (for ``__post_init__``)."""
-    for item in dataclasses.fields(record):
-        value = getattr(record, item.name)
-        if isinstance(value, np.ndarray):
-            value.setflags(write=False)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -95,7 +96,7 @@ class Stamp:
     cell_sha256: str
     config_sha256: str
     content_sha256: str = ""
-    format_version: str = "1.0"
+    format_version: str = "1.1"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -172,7 +173,8 @@ class WorkspaceMap:
     """Path reachability over the cubes, seen from one scan configuration.
 
     ``x``, ``y``, ``z`` and the three percentages are the stitched lattice, where
-    frames of points that cubes share are pooled (Eq. 1).
+    frames of points that cubes share are pooled (Eq. 1). Files of version 1.0 lack
+    ``components`` and ``T_world_base``, shape (4, 4).
     """
 
     cubes: Mapping[str, CubeMap]
@@ -189,32 +191,8 @@ class WorkspaceMap:
     stamp: Stamp
     provenance: Provenance
     run: RunInfo = RunInfo()
-
-    def __post_init__(self) -> None:
-        freeze(self)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PathStore:
-    """Ragged store of joint paths (CF contiguous ragged array).
-
-    Attributes
-    ----------
-    configuration : array, shape (points, dof)
-        Way-points of all paths, one after another [rad].
-    row_size : int array, shape (paths,)
-        Number of way-points of each path.
-    planned_size : int array, shape (paths,)
-        How many of them, from the first, are the planned part; the rest is the
-        straight approach.
-    index : int array, shape (paths, 5)
-        layer, y, x, orientation, repeat of each path.
-    """
-
-    configuration: FloatArray
-    row_size: IntArray
-    planned_size: IntArray
-    index: IntArray
+    components: Components | None = None
+    T_world_base: FloatArray | None = None
 
     def __post_init__(self) -> None:
         freeze(self)
@@ -254,6 +232,14 @@ class BinMap:
         Of the shortest path [rad].
     path_reachability : array, shape (nl, ny, nx)
         Percent over orientations.
+    component : int array, shape (nl, ny, nx, no), or None
+        Connected component of the roadmap, -1 where there is none.
+    winning_roll : array, shape (nl, ny, nx, no), or None
+        Roll about the approach axis that the best path takes, where roll is free
+        [rad]; NaN without a path.
+    T_world_base : array, shape (4, 4), or None
+    components, effort, best, times, margins, cycle
+        What maps hold since version 1.1; None where the file does not.
     """
 
     layer: FloatArray
@@ -288,6 +274,15 @@ class BinMap:
     provenance: Provenance
     run: RunInfo = RunInfo()
     hit_time_limit: CodeArray = field(default_factory=lambda: np.zeros(0, np.uint8))
+    component: IntArray | None = None
+    components: Components | None = None
+    effort: Effort | None = None
+    best: BestPaths | None = None
+    winning_roll: FloatArray | None = None
+    times: ApproachTimes | None = None
+    margins: Margins | None = None
+    cycle: Cycle | None = None
+    T_world_base: FloatArray | None = None
 
     def __post_init__(self) -> None:
         if self.hit_time_limit.size == 0:
@@ -319,6 +314,14 @@ class BinPlacement:
     margin : mapping
         Direction ("+x", "-yaw", …) to how far the bin can move [m or rad] before
         the score drops by 5 points.
+    tolerance : pair of float, or None
+        Shift [m] and turn [rad] under which ``worst_score`` is taken.
+    worst_score, score_error : array, shape (n,), or None
+        Least score under the tolerance, and the standard error of ``score``
+        [percent]; NaN if excluded.
+    support : str or None
+        Body that the bin stands on, "" if it stands on none.
+    T_world_base : array, shape (4, 4), or None
     """
 
     bin_pose: FloatArray
@@ -338,6 +341,11 @@ class BinPlacement:
     stamp: Stamp
     provenance: Provenance
     run: RunInfo = RunInfo()
+    tolerance: tuple[float, float] | None = None
+    worst_score: FloatArray | None = None
+    score_error: FloatArray | None = None
+    support: str | None = None
+    T_world_base: FloatArray | None = None
 
     def __post_init__(self) -> None:
         freeze(self)

@@ -121,7 +121,7 @@ def test_root_attributes_and_provenance_are_there(
     """What every artefact says of itself, and of where it comes from."""
     with h5py.File(files[kind]) as file:
         assert set(file.attrs) >= ROOT
-        assert file.attrs["format_version"] == "1.0"
+        assert file.attrs["format_version"] == "1.1"
         assert file.attrs["seed"].dtype == np.uint64
         assert list(file[file.attrs["signal"]].shape) == [
             len(file[axis]) for axis in file.attrs["axes"]

@@ -4,6 +4,7 @@ import dataclasses
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -29,6 +30,11 @@ from tests.support.synthetic_maps import (
     synthetic_placement,
     synthetic_provenance,
     synthetic_workspace_map,
+)
+from tests.support.synthetic_parts import (
+    bin_with_parts,
+    placement_with_parts,
+    workspace_with_parts,
 )
 
 PROPERTY = settings(
@@ -225,3 +231,31 @@ def test_the_numbers_of_a_bin_need_not_be_in_the_types_of_the_file(
     write_bin_map(tmp_path / "a.h5", record)
     write_bin_map(tmp_path / "b.h5", loose)
     assert (tmp_path / "a.h5").read_bytes() == (tmp_path / "b.h5").read_bytes()
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_the_parts_of_version_1_1_come_back(tmp_path: Path, seed: int) -> None:
+    """Evidence, effort, best paths, rolls, times, margins, cycle, world, tolerance."""
+    rng = np.random.default_rng(seed)
+    connected = rng.random((1, 4, 5, 6)) < 0.5
+    record = bin_with_parts(synthetic_bin_map(0.4, connected=connected), seed)
+    write_and_read(record, write_bin_map, read_bin_map, tmp_path / "b.h5")
+    fractions = rng.random((2, 3, 2))
+    workspace = workspace_with_parts(synthetic_workspace_map(fractions, shared_row=1))
+    write_and_read(
+        workspace, write_workspace_map, read_workspace_map, tmp_path / "w.h5"
+    )
+    placement = placement_with_parts(synthetic_placement())
+    write_and_read(placement, write_placement, read_placement, tmp_path / "p.h5")
+
+
+def test_what_a_record_lacks_is_absent(tmp_path: Path) -> None:
+    """Without the parts, a file has none of their variables, and reads as None."""
+    path = tmp_path / "b.h5"
+    write_bin_map(path, synthetic_bin_map())
+    with h5py.File(path) as file:
+        assert not {"component", "effort_checks", "best_path", "cycle"} & set(file)
+        assert "stage" not in file["paths"]
+    record = read_bin_map(path)
+    assert record.best is None
+    assert record.paths.stage is None

@@ -8,16 +8,27 @@ import numpy as np
 import pytest
 
 from reachmap.maps import write_bin_map, write_placement, write_workspace_map
-from reachmap.maps.format.layout import COMMON_ATTRIBUTES, PROVENANCE_TEXTS, RUN_TEXTS
+from reachmap.maps.format.layout import (
+    COMMON_ATTRIBUTES,
+    PROVENANCE_TEXTS,
+    RUN_TEXTS,
+    Layout,
+    Variable,
+)
 from reachmap.maps.format.registry import LAYOUTS
 from tests.support.synthetic_maps import (
     synthetic_bin_map,
     synthetic_placement,
     synthetic_workspace_map,
 )
+from tests.support.synthetic_parts import (
+    bin_with_parts,
+    placement_with_parts,
+    workspace_with_parts,
+)
 
 PAGE = Path(__file__).parents[3] / "docs" / "reference" / "artefacts.md"
-TYPES = {"f8": "float64", "u1": "uint8", "i4": "int32"}
+TYPES = {"f8": "float64", "u1": "uint8", "i4": "int32", "u4": "uint32"}
 
 
 def rows() -> dict[str, list[list[str]]]:
@@ -30,15 +41,23 @@ def rows() -> dict[str, list[list[str]]]:
     return found
 
 
+def every_variable(layout: Layout) -> list[Variable]:
+    """Variables of a layout and of its sections."""
+    return [
+        *layout.variables,
+        *(variable for section in layout.sections for variable in section.variables),
+    ]
+
+
 @pytest.fixture(scope="module")
 def files(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     """One file of each kind."""
     folder = tmp_path_factory.mktemp("files")
     paths = [folder / name for name in ("workspace.h5", "bin.h5", "placement.h5")]
     workspace = synthetic_workspace_map(np.full((1, 3, 2), 0.5), shared_row=1)
-    write_workspace_map(paths[0], workspace)
-    write_bin_map(paths[1], synthetic_bin_map())
-    write_placement(paths[2], synthetic_placement())
+    write_workspace_map(paths[0], workspace_with_parts(workspace))
+    write_bin_map(paths[1], bin_with_parts(synthetic_bin_map()))
+    write_placement(paths[2], placement_with_parts(synthetic_placement()))
     return paths
 
 
@@ -87,7 +106,7 @@ def test_every_attribute_that_is_written_is_documented(files: list[Path]) -> Non
 def test_the_page_has_every_variable_in_the_words_of_the_file(kind: str) -> None:
     """The meaning on the page is the long_name in the file; nothing is left over."""
     page = rows()
-    for variable in LAYOUTS[kind].variables:
+    for variable in every_variable(LAYOUTS[kind]):
         name = variable.path.replace("{cube}", "<name>")
         wanted = [
             ", ".join(variable.dims),
@@ -111,13 +130,13 @@ def test_the_page_has_nothing_that_no_file_has() -> None:
     known = {
         variable.path.replace("{cube}", "<name>")
         for layout in LAYOUTS.values()
-        for variable in layout.variables
+        for variable in every_variable(layout)
     }
     known |= {name for layout in LAYOUTS.values() for name in layout.attributes}
     known |= set(COMMON_ATTRIBUTES)
     known |= {f"provenance/{name}" for name in PROVENANCE_TEXTS}
     known |= {f"run/{name}" for name in RUN_TEXTS}
-    known |= {"workspace.h5", "placement.h5", "bin.h5"}
+    known |= {"support", "workspace.h5", "placement.h5", "bin.h5"}
     assert set(rows()) == known
 
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Container, Iterable, Mapping, Sequence
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
@@ -29,12 +30,26 @@ from reachmap.maps.provenance import (
 )
 from reachmap.maps.records import Provenance, RunInfo, Stamp
 
+GROUP_LABELS = ("stages", "methods")
+"""Lists that the group of their variables carries, too."""
 
-def expand(layout: Layout, cubes: Iterable[str] = ()) -> list[Variable]:
-    """Variables of a layout, those of ``{cube}`` once for each cube."""
+
+def expand(
+    layout: Layout, cubes: Iterable[str] = (), paths: Container[str] = ()
+) -> list[Variable]:
+    """Variables of a layout, those of ``{cube}`` once for each cube.
+
+    Of its sections, those that one of the ``paths`` belongs to.
+    """
     names = list(cubes)
     variables = []
-    for variable in layout.variables:
+    present = [section for section in layout.sections if section.is_in(paths)]
+    scales = {v.path: v for section in present for v in section.scales}
+    for variable in (
+        *layout.variables,
+        *scales.values(),
+        *(v for section in present for v in section.arrays.values()),
+    ):
         if "{cube}" in variable.path:
             variables += [
                 dataclasses.replace(variable, path=variable.path.format(cube=name))
@@ -55,6 +70,8 @@ def assemble(
     provenance: Provenance,
     run: RunInfo,
     cubes: Sequence[str] = (),
+    numbers: Mapping[str, float] | None = None,
+    texts: Mapping[str, str] | None = None,
 ) -> Tree:
     """Build the tree of an artefact, checksums included.
 
@@ -71,6 +88,10 @@ def assemble(
         As in the record; the stamp's ``content_sha256`` is computed anew.
     cubes : sequence of str
         Names of the cubes of a workspace map.
+    numbers : mapping of str to float, optional
+        Numbers that variables carry as attributes, by the name of the attribute.
+    texts : mapping of str to str, optional
+        Texts at the root, by name.
 
     Raises
     ------
@@ -82,9 +103,9 @@ def assemble(
     tree.attributes.update(
         {k: tuple(v) for k, v in labels.items() if k in layout.attributes}
     )
-    variables = expand(layout, cubes)
+    variables = expand(layout, cubes, arrays)
     sizes = _dimension_sizes(variables, arrays)
-    _add_groups(tree, variables)
+    _add_groups(tree, variables, labels)
     for variable in variables:
         value = arrays.get(variable.path)
         if value is None and variable.dims == (variable.name,):
@@ -94,9 +115,10 @@ def assemble(
         leaf = Leaf(
             value=_fitted(variable, value),
             dims=variable.dims,
-            attributes=_variable_attributes(variable, labels),
+            attributes=_variable_attributes(variable, labels, numbers or {}),
         )
         tree.leaves[variable.path] = leaf
+    tree.leaves.update({k: Leaf(value=text) for k, text in (texts or {}).items()})
     _add_texts(tree, "provenance", provenance_texts(provenance))
     _add_texts(tree, "run", run_texts(run))
     tree.attributes["content_sha256"] = content_sha256(tree)
@@ -151,7 +173,9 @@ def _fitted(variable: Variable, value: Any) -> Array:
 
 
 def _variable_attributes(
-    variable: Variable, labels: Mapping[str, Sequence[str]]
+    variable: Variable,
+    labels: Mapping[str, Sequence[str]],
+    numbers: Mapping[str, float],
 ) -> dict[str, Any]:
     attributes: dict[str, Any] = {
         "units": variable.units,
@@ -167,10 +191,14 @@ def _variable_attributes(
         attributes["flag_meanings"] = "no yes"
     if variable.labels:
         attributes[variable.labels] = tuple(labels[variable.labels])
+    if variable.number:
+        attributes[variable.number] = float(numbers[variable.number])
     return attributes
 
 
-def _add_groups(tree: Tree, variables: Sequence[Variable]) -> None:
+def _add_groups(
+    tree: Tree, variables: Sequence[Variable], labels: Mapping[str, Sequence[str]]
+) -> None:
     for variable in variables:
         if variable.group.startswith("cubes/"):
             tree.groups.setdefault("cubes", {"NX_class": "NXcollection"})
@@ -180,13 +208,58 @@ def _add_groups(tree: Tree, variables: Sequence[Variable]) -> None:
                 "axes": ("z", "y", "x", "orientation"),
             }
         elif variable.group:
-            tree.groups[variable.group] = {"NX_class": "NXcollection"}
+            tree.groups.setdefault(variable.group, {"NX_class": "NXcollection"})
+        if variable.labels in GROUP_LABELS:
+            tree.groups[variable.group][variable.labels] = tuple(
+                labels[variable.labels]
+            )
 
 
 def _add_texts(tree: Tree, group: str, texts: Mapping[str, str]) -> None:
     tree.groups[group] = {"NX_class": "NXcollection"}
     for name, text in texts.items():
         tree.leaves[f"{group}/{name}"] = Leaf(value=text)
+
+
+def section_arrays(
+    layout: Layout, record: Any
+) -> tuple[dict[str, Any], dict[str, Sequence[str]], dict[str, float]]:
+    """Arrays by path, lists and numbers of the sections that a record has."""
+    arrays: dict[str, Any] = {}
+    lists: dict[str, Sequence[str]] = {}
+    numbers: dict[str, float] = {}
+    for section in layout.sections:
+        part = attrgetter(section.field)(record) if section.field else None
+        if part is None:
+            continue
+        for name, variable in section.arrays.items():
+            arrays[variable.path] = getattr(part, name) if section.part else part
+        lists.update({label: getattr(part, n) for n, label in section.lists.items()})
+        numbers.update({key: getattr(part, n) for n, key in section.numbers.items()})
+    return arrays, lists, numbers
+
+
+def sections_of(layout: Layout, tree: Tree) -> dict[str, Any]:
+    """Fields of a record that the sections of a checked tree fill."""
+    fields: dict[str, Any] = {}
+    for section in layout.sections:
+        if not section.field or not section.is_in(tree.leaves):
+            continue
+        values: dict[str, Any] = {
+            name: tree.array(variable.path) for name, variable in section.arrays.items()
+        }
+        attributes = {
+            key: value
+            for variable in section.variables
+            for key, value in tree.leaves[variable.path].attributes.items()
+        }
+        for name, label in section.lists.items():
+            values[name] = tuple(attributes[label])
+        for name, key in section.numbers.items():
+            values[name] = float(attributes[key])
+        only = next(iter(values.values()))
+        fields[section.field] = section.part(**values) if section.part else only
+    return fields
 
 
 def stamp_of(tree: Tree) -> Stamp:

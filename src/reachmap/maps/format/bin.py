@@ -6,20 +6,17 @@ import dataclasses
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from reachmap._typing import FloatArray
-from reachmap.maps.bytes.tree import Array, Tree
-from reachmap.maps.format.assembly import assemble, provenance_of, run_of, stamp_of
-from reachmap.maps.format.checks import (
-    check_coordinates,
-    check_goals,
-    check_outcome,
-    check_percent,
-    check_pose,
-    check_quaternions,
-    require,
+from reachmap.geometry import AXES
+from reachmap.maps.bytes.tree import Tree
+from reachmap.maps.format.assembly import (
+    assemble,
+    provenance_of,
+    run_of,
+    section_arrays,
+    sections_of,
+    stamp_of,
 )
+from reachmap.maps.format.bin_checks import check_bin
 from reachmap.maps.format.layout import (
     COMMON_SCALES,
     NONNEGATIVE,
@@ -32,121 +29,13 @@ from reachmap.maps.format.layout import (
     index,
     outcome,
 )
+from reachmap.maps.format.sections import BIN_SECTIONS
 from reachmap.maps.format.store import load, store
-from reachmap.maps.records import BinMap, PathStore, Status
+from reachmap.maps.records import BinMap, PathStore
+from reachmap.maps.summary.directions import reachability_of_directions
 
 INDEX_COLUMNS = ("layer", "y", "x", "orientation", "repeat")
 """What the columns of ``/paths/index`` count."""
-
-_PATH_VALUES = (
-    "path_length", "path_length_planned", "tcp_path_length", "execution_time",
-    "planning_time", "planning_cpu_time", "simplification_time",
-)  # fmt: skip
-# The keys of reachmap.geometry.AXES, without waiting for SciPy.
-_AXES = tuple(f"{sign}{name}" for name in "xyz" for sign in "+-")
-_LENGTH_TOLERANCE_RAD = 1e-6
-
-
-def check_bin(tree: Tree) -> list[str]:
-    """Outcome, attempts, poses, percentages and stored paths."""
-    status = tree.array("status")
-    found = tree.array("path_found") == 1
-    any_found = found.any(axis=-1)
-    connected = tree.array("connected") == 1
-    attempted = status != Status.NOT_ATTEMPTED
-    percent = np.full(status.shape[:-1], np.nan)
-    np.divide(
-        100.0 * (status == Status.PATH_FOUND).sum(axis=-1),
-        attempted.sum(axis=-1),
-        out=percent,
-        where=attempted.any(axis=-1),
-    )
-    problems = [
-        *_check_approach(tree),
-        *check_outcome(tree, ""),
-        *check_quaternions(tree.array("quaternion_wxyz"), ""),
-        *check_coordinates(tree, "", ("layer", "y", "x")),
-        *check_pose(tree.array("bin_pose")),
-        *require(
-            (status == Status.PATH_FOUND) | ~any_found,
-            "status must be path_found where an attempt found a path",
-        ),
-        *require(
-            (status != Status.PATH_FOUND) | any_found | connected,
-            "status must not be path_found without an attempt or a connection",
-        ),
-        *check_goals(tree.array("goal_configuration"), any_found, ""),
-        *check_percent(tree, "path_reachability", percent),
-    ]
-    for name in _PATH_VALUES:
-        problems += require(
-            np.isfinite(tree.array(name)) == found,
-            f"{name} must be finite exactly where path_found is 1",
-        )
-    return problems or _check_paths(tree)
-
-
-def _check_approach(tree: Tree) -> list[str]:
-    axis = tree.attributes["approach_axis"]
-    distance = tree.attributes["approach_distance_m"]
-    problems = []
-    if axis not in _AXES:
-        problems.append(f"approach_axis must be one of {', '.join(_AXES)}")
-    if not isinstance(distance, float) or not 0.0 <= distance < np.inf:
-        problems.append("approach_distance_m must be a length")
-    return problems
-
-
-def _check_paths(tree: Tree) -> list[str]:
-    """Check that stored paths are whole, found, and as long as the map says."""
-    index = tree.array("paths/index")
-    rows, planned = tree.array("paths/row_size"), tree.array("paths/planned_size")
-    points = tree.array("paths/configuration")
-    found = tree.array("path_found") == 1
-    if index.shape[1:] != (5,) or int(rows.sum()) != len(points):
-        return ["paths/row_size must add up to the stored way-points"]
-    if (planned > rows).any():
-        return ["paths/planned_size must not exceed row_size"]
-    if index.size == 0:
-        return []
-    if (index >= np.array(found.shape)).any():
-        return ["paths/index must name test grasps and attempts of this map"]
-    place = tuple(index.T)
-    whole, part = path_lengths(points, rows, planned)
-    return [
-        *require(found[place], "paths/index must name attempts that found a path"),
-        *require(
-            np.abs(whole - tree.array("path_length")[place])
-            <= _LENGTH_TOLERANCE_RAD * (1.0 + whole),
-            "paths must be as long as path_length says",
-        ),
-        *require(
-            np.abs(part - tree.array("path_length_planned")[place])
-            <= _LENGTH_TOLERANCE_RAD * (1.0 + part),
-            "paths must be as long as path_length_planned says up to planned_size",
-        ),
-    ]
-
-
-def path_lengths(
-    points: FloatArray, rows: Array, planned: Array
-) -> tuple[FloatArray, FloatArray]:
-    """Joint-space lengths of ragged paths [rad]: whole, and of the planned part.
-
-    Parameters
-    ----------
-    points : array, shape (points, dof)
-    rows, planned : int array, shape (paths,)
-        Way-points of each path, and of its planned part.
-    """
-    # Length up to each way-point as if all paths were one; jumps between paths cancel.
-    steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
-    travelled = np.concatenate([[0.0], np.cumsum(steps)])
-    first = np.cumsum(rows) - rows
-    start = travelled[first]
-    whole = travelled[first + rows - 1] - start
-    return np.asarray(whole), np.asarray(travelled[first + planned - 1] - start)
-
 
 _POINT = ("layer", "y", "x")
 _GRASP = (*_POINT, "orientation")
@@ -167,6 +56,7 @@ def _measured(name: str, units: str, meaning: str) -> Variable:
 BIN = Layout(
     kind="bin_map",
     check=check_bin,
+    sections=BIN_SECTIONS,
     title="Path reachability of test grasps in a bin",
     signal="path_reachability",
     axes=_POINT,
@@ -298,22 +188,21 @@ BIN = Layout(
             dims=("path", "index_column"),
             dtype="i4",
             units="1",
-            meaning="Test grasp and attempt of each path.",
-            low=0,
+            meaning="Test grasp and attempt of each path; repeat -1: no attempt.",
+            low=-1,
             labels="columns",
         ),
     ),
 )
 
 
-_NOT_ARRAYS = {
-    "approach_axis", "approach_distance", "joint_names", "body_pairs", "paths",
-    "stamp", "provenance", "run",
-}  # fmt: skip
 _ARRAYS = tuple(
-    item.name for item in dataclasses.fields(BinMap) if item.name not in _NOT_ARRAYS
+    variable.name
+    for variable in BIN.variables
+    if not variable.group
+    and variable.name in {item.name for item in dataclasses.fields(BinMap)}
 )
-_PATHS = tuple(item.name for item in dataclasses.fields(PathStore))
+_PATHS = ("configuration", "row_size", "planned_size", "index")
 
 
 def write_bin_map(path: Path, record: BinMap, overwrite: bool = False) -> str:
@@ -346,6 +235,12 @@ def tree_from_bin_map(record: BinMap) -> Tree:
     """Everything that the file will hold."""
     arrays: dict[str, Any] = {name: getattr(record, name) for name in _ARRAYS}
     arrays.update({f"paths/{n}": getattr(record.paths, n) for n in _PATHS})
+    if record.approach_axis in AXES:
+        directions, points = reachability_of_directions(record)
+        arrays["direction_reachability"] = directions
+        arrays["point_reachability"] = points
+    optional, lists, numbers = section_arrays(BIN, record)
+    arrays.update(optional)
     return assemble(
         BIN,
         arrays=arrays,
@@ -357,7 +252,9 @@ def tree_from_bin_map(record: BinMap) -> Tree:
             "joint_names": record.joint_names,
             "body_pairs": record.body_pairs,
             "columns": INDEX_COLUMNS,
+            **lists,
         },
+        numbers=numbers,
         stamp=record.stamp,
         provenance=record.provenance,
         run=record.run,
@@ -378,14 +275,19 @@ def read_bin_map(path: Path) -> BinMap:
 
 def bin_map_from_tree(tree: Tree, path: Path) -> BinMap:
     """Turn a checked tree into a record; ``path`` is named in messages."""
+    sections = sections_of(BIN, tree)
+    stage = sections.pop("paths.stage", None)
+    paths = {name: tree.array(f"paths/{name}") for name in _PATHS}
+    arrays: dict[str, Any] = {name: tree.array(name) for name in _ARRAYS}
     return BinMap(
-        **{name: tree.array(name) for name in _ARRAYS},
+        **arrays,
         approach_axis=str(tree.attributes["approach_axis"]),
         approach_distance=float(tree.attributes["approach_distance_m"]),
         joint_names=tuple(tree.attributes["joint_names"]),
         body_pairs=tuple(tree.attributes["body_pairs"]),
-        paths=PathStore(**{name: tree.array(f"paths/{name}") for name in _PATHS}),
+        paths=PathStore(**paths, stage=stage),
         stamp=stamp_of(tree),
         provenance=provenance_of(tree, path),
         run=run_of(tree, path),
+        **sections,
     )

@@ -8,11 +8,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from reachmap._typing import BoolArray, FloatArray
+from reachmap._typing import BoolArray, CodeArray, FloatArray, IntArray
 from reachmap.maps.bytes.tree import Tree
 from reachmap.maps.records import NO_PAIR, Status
 
 _ROTATION_TOLERANCE = 1e-6
+LENGTH_TOLERANCE_RAD = 1e-6
+"""By which lengths may differ from those of the stored way-points, and their share."""
 
 
 def require(holds: BoolArray, sentence: str) -> list[str]:
@@ -99,11 +101,77 @@ def check_percent(tree: Tree, path: str, percent: FloatArray) -> list[str]:
     return require(same, f"{path} must be what Eq. (1) gives for the status")
 
 
-def check_pose(T: FloatArray) -> list[str]:
-    """``bin_pose`` is a rigid transform."""
+def check_pose(T: FloatArray, name: str = "bin_pose") -> list[str]:
+    """``bin_pose``, or another, is a rigid transform."""
     if T.shape != (4, 4) or not np.allclose(T[3], [0, 0, 0, 1], atol=0):
-        return ["bin_pose must be a homogeneous matrix"]
+        return [f"{name} must be a homogeneous matrix"]
     R = T[:3, :3]
     if not np.allclose(R @ R.T, np.eye(3), atol=_ROTATION_TOLERANCE):
-        return ["bin_pose must hold a rotation"]
-    return [] if np.linalg.det(R) > 0 else ["bin_pose must not mirror"]
+        return [f"{name} must hold a rotation"]
+    return [] if np.linalg.det(R) > 0 else [f"{name} must not mirror"]
+
+
+def check_world(tree: Tree) -> list[str]:
+    """``T_world_base``, where a file has it, is a rigid transform."""
+    name = "T_world_base"
+    return check_pose(tree.array(name), name) if name in tree.leaves else []
+
+
+def share_of(hits: BoolArray, tried: BoolArray) -> FloatArray:
+    """Eq. (1): hits among what was tried over the last axis [percent]."""
+    percent = np.full(tried.shape[:-1], np.nan)
+    count = (hits & tried).sum(axis=-1)
+    np.divide(100.0 * count, tried.sum(axis=-1), out=percent, where=tried.any(axis=-1))
+    return percent
+
+
+def check_components(
+    tree: Tree, frames: list[tuple[str, CodeArray, IntArray]]
+) -> list[str]:
+    """Evidence of components against the frames that lie in them.
+
+    Parameters
+    ----------
+    tree : Tree
+    frames : list of (str, array, array)
+        Prefix, status and component of test frames.
+    """
+    if "components/checks" not in tree.leaves:
+        return []
+    reached = tree.array("components/reached") == 1
+    problems = require(
+        tree.array("components/method_checks").sum(axis=1)
+        == tree.array("components/checks"),
+        "components/method_checks must add up to checks",
+    )
+    for prefix, status, component in frames:
+        if (component >= len(reached)).any():
+            problems.append(f"{prefix}component must count in /components")
+            continue
+        known = component >= 0
+        is_reached = np.append(reached, False)[component]
+        problems += require(
+            ~known | (status != Status.NO_PATH_FOUND) | ~is_reached,
+            f"{prefix}status must not be no_path_found in a component that is reached",
+        )
+    return problems
+
+
+def path_lengths(
+    points: FloatArray, rows: IntArray, planned: IntArray
+) -> tuple[FloatArray, FloatArray]:
+    """Joint-space lengths of ragged paths [rad]: whole, and of the planned part.
+
+    Parameters
+    ----------
+    points : array, shape (points, dof)
+    rows, planned : int array, shape (paths,)
+        Way-points of each path, and of its planned part.
+    """
+    # Length up to each way-point as if all paths were one; jumps between paths cancel.
+    steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    travelled = np.concatenate([[0.0], np.cumsum(steps)])
+    first = np.cumsum(rows) - rows
+    start = travelled[first]
+    whole = travelled[first + rows - 1] - start
+    return np.asarray(whole), np.asarray(travelled[first + planned - 1] - start)

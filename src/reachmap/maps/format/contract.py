@@ -32,7 +32,7 @@ def check_structure(tree: Tree, layout: Layout) -> list[str]:
         not know are ignored: a newer minor version may bring them.
     """
     problems = _check_root(tree, layout)
-    variables = expand(layout, tree.cubes())
+    variables = expand(layout, tree.cubes(), tree.leaves)
     sound = []
     for variable in variables:
         leaf = tree.leaves.get(variable.path)
@@ -92,6 +92,10 @@ def _check_leaf(variable: Variable, leaf: Leaf) -> list[str]:
             problems.append(f"{path} lacks its list {variable.labels}")
         elif variable.dims == (variable.name,) and len(labels) != value.size:
             problems.append(f"{path} and its list {variable.labels} differ in length")
+    if variable.number:
+        number = leaf.attributes.get(variable.number)
+        if not isinstance(number, float) or not 0.0 < number < np.inf:
+            problems.append(f"{path} lacks its positive number {variable.number}")
     return problems
 
 
@@ -121,7 +125,7 @@ def _scale_size(tree: Tree, group: str, dimension: str) -> int | None:
 def check_ranges(tree: Tree, layout: Layout) -> list[str]:
     """Numbers are finite where they must be, and within the range of their kind."""
     problems = []
-    for variable in expand(layout, tree.cubes()):
+    for variable in expand(layout, tree.cubes(), tree.leaves):
         problems += _check_values(variable, tree.array(variable.path), tree.attributes)
     return problems
 

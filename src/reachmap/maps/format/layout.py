@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import dataclasses
+from collections.abc import Callable, Container, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -12,7 +13,7 @@ from reachmap.maps.records import Status
 STATUS_MEANINGS = " ".join(item.name.lower() for item in Status)
 STATUS_CODES = tuple(int(item) for item in Status)
 
-FORMAT_VERSION = "1.0"
+FORMAT_VERSION = "1.1"
 FORMAT_PREFIX = "reachmap."
 
 
@@ -46,6 +47,8 @@ class Variable:
         Whether the numbers are :class:`~reachmap.maps.records.Status` codes.
     is_flag : bool
         Whether the numbers are 0 for no and 1 for yes.
+    number : str
+        Name of an attribute that holds a number ("seconds_per_check"), or "".
     """
 
     path: str
@@ -61,6 +64,7 @@ class Variable:
     is_index: bool = False
     is_status: bool = False
     is_flag: bool = False
+    number: str = ""
 
     @property
     def name(self) -> str:
@@ -71,6 +75,44 @@ class Variable:
     def group(self) -> str:
         """Group it lies in, "" for the root."""
         return self.path.rpartition("/")[0]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Section:
+    """Variables that a file has all of, or none.
+
+    Attributes
+    ----------
+    field : str
+        Field of the record that holds them, None where a file does not; "" where they
+        follow from the rest of the record.
+    part : callable or None
+        Makes what is in that field of the arrays; None: the one array itself.
+    arrays : mapping of str to Variable
+        Field of the part to its variable.
+    scales : tuple of Variable
+        Coordinates that only these variables have.
+    lists : mapping of str to str
+        Field of the part that is a list of texts, to the name of the list.
+    numbers : mapping of str to str
+        Field of the part that is a number, to the name of the attribute.
+    """
+
+    field: str
+    part: Callable[..., Any] | None = None
+    arrays: Mapping[str, Variable]
+    scales: tuple[Variable, ...] = ()
+    lists: Mapping[str, str] = dataclasses.field(default_factory=dict)
+    numbers: Mapping[str, str] = dataclasses.field(default_factory=dict)
+
+    @property
+    def variables(self) -> tuple[Variable, ...]:
+        """Scales first."""
+        return (*self.scales, *self.arrays.values())
+
+    def is_in(self, paths: Container[str]) -> bool:
+        """Whether any of its variables is among the paths."""
+        return any(variable.path in paths for variable in self.arrays.values())
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,6 +154,8 @@ class Layout:
         mean.
     check : callable
         Whether the numbers agree with each other; sentences where they do not.
+    sections : tuple of Section
+        What a file may have besides; version 1.0 had nothing of it.
     """
 
     kind: str
@@ -121,6 +165,7 @@ class Layout:
     variables: tuple[Variable, ...]
     attributes: dict[str, str]
     check: Callable[[Tree], list[str]]
+    sections: tuple[Section, ...] = ()
 
     @property
     def format(self) -> str:

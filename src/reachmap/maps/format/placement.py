@@ -9,9 +9,17 @@ from typing import Any
 import numpy as np
 
 from reachmap.maps.bytes.tree import Tree
-from reachmap.maps.format.assembly import assemble, provenance_of, run_of, stamp_of
-from reachmap.maps.format.checks import check_pose, require
+from reachmap.maps.format.assembly import (
+    assemble,
+    provenance_of,
+    run_of,
+    section_arrays,
+    sections_of,
+    stamp_of,
+)
+from reachmap.maps.format.checks import check_pose, check_world, require
 from reachmap.maps.format.layout import PERCENT, SCAN, Layout, Variable, index
+from reachmap.maps.format.sections import PLACEMENT_SECTIONS
 from reachmap.maps.format.store import load, store
 from reachmap.maps.records import BinPlacement
 
@@ -19,7 +27,13 @@ from reachmap.maps.records import BinPlacement
 def check_placement(tree: Tree) -> list[str]:
     """Check the chosen row against the pose, and reasons against missing scores."""
     score, reason = tree.array("score"), tree.array("reason")
-    problems = check_pose(tree.array("bin_pose"))
+    problems = [*check_pose(tree.array("bin_pose")), *check_world(tree)]
+    for name in ("worst_score", "score_error"):
+        if name in tree.leaves:
+            problems += require(
+                ~np.isnan(score) | np.isnan(tree.array(name)),
+                f"{name} must be NaN where a candidate has no score",
+            )
     for name, least in (("chosen", 0), ("runner_up", -1), ("paper_choice", -1)):
         row = tree.attributes.get(name)
         if not isinstance(row, int) or not least <= row < len(score):
@@ -53,6 +67,7 @@ def _per_candidate(
 PLACEMENT = Layout(
     kind="bin_placement",
     check=check_placement,
+    sections=PLACEMENT_SECTIONS,
     title="Where the bin goes in a robot cell",
     signal="score",
     axes=("candidate",),
@@ -200,9 +215,11 @@ def tree_from_placement(record: BinPlacement) -> Tree:
         shift_margin=np.array(list(shift.values()), float),
         turn_margin=np.array(list(turn.values()), float),
     )
+    optional, lists, numbers = section_arrays(PLACEMENT, record)
+    texts = {} if record.support is None else {"support": record.support}
     return assemble(
         PLACEMENT,
-        arrays=arrays,
+        arrays={**arrays, **optional},
         attributes={
             **{name: int(getattr(record, name)) for name in _ROWS},
             "rule": record.rule,
@@ -212,7 +229,11 @@ def tree_from_placement(record: BinPlacement) -> Tree:
             "reasons": reasons,
             "shift_directions": tuple(shift),
             "turn_directions": tuple(turn),
+            "tolerance_parts": ("shift_m", "turn_rad"),
+            **lists,
         },
+        numbers=numbers,
+        texts=texts,
         stamp=record.stamp,
         provenance=record.provenance,
         run=record.run,
@@ -241,6 +262,9 @@ def placement_from_tree(tree: Tree, path: Path) -> BinPlacement:
     reasons = tree.attributes["reasons"]
     stored: dict[str, Any] = {name: tree.array(name) for name in _ARRAYS}
     stored.update({name: int(tree.attributes[name]) for name in _ROWS})
+    optional = sections_of(PLACEMENT, tree)
+    if "tolerance" in optional:
+        optional["tolerance"] = tuple(optional["tolerance"].tolist())
     position, yaw = tree.array("candidate_position"), tree.array("candidate_yaw")
     return BinPlacement(
         **stored,
@@ -252,6 +276,8 @@ def placement_from_tree(tree: Tree, path: Path) -> BinPlacement:
         stamp=stamp_of(tree),
         provenance=provenance_of(tree, path),
         run=run_of(tree, path),
+        support=tree.text("support") if "support" in tree.leaves else None,
+        **optional,
     )
 
 

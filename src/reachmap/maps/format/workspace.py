@@ -9,13 +9,22 @@ from typing import Any
 import numpy as np
 
 from reachmap.maps.bytes.tree import Tree
-from reachmap.maps.format.assembly import assemble, provenance_of, run_of, stamp_of
+from reachmap.maps.format.assembly import (
+    assemble,
+    provenance_of,
+    run_of,
+    section_arrays,
+    sections_of,
+    stamp_of,
+)
 from reachmap.maps.format.checks import (
+    check_components,
     check_coordinates,
     check_goals,
     check_outcome,
     check_percent,
     check_quaternions,
+    check_world,
     require,
 )
 from reachmap.maps.format.layout import (
@@ -30,6 +39,7 @@ from reachmap.maps.format.layout import (
     index,
     outcome,
 )
+from reachmap.maps.format.sections import WORKSPACE_SECTIONS
 from reachmap.maps.format.store import load, store
 from reachmap.maps.records import (
     KINDS,
@@ -46,6 +56,11 @@ def check_workspace(tree: Tree) -> list[str]:
     problems = []
     for name in tree.cubes():
         problems += _check_cube(tree, f"cubes/{name}/")
+    frames = [
+        (prefix, tree.array(f"{prefix}status"), tree.array(f"{prefix}component"))
+        for prefix in (f"cubes/{name}/" for name in tree.cubes())
+    ]
+    problems += [*check_components(tree, frames), *check_world(tree)]
     return problems or _check_stitching(tree)
 
 
@@ -106,6 +121,7 @@ _CUBE = "cubes/{cube}/"
 WORKSPACE = Layout(
     kind="workspace_map",
     check=check_workspace,
+    sections=WORKSPACE_SECTIONS,
     title="Path reachability over the workspace of a robot cell",
     signal="path_reachability",
     axes=_LEVEL,
@@ -233,11 +249,17 @@ def tree_from_workspace_map(record: WorkspaceMap) -> Tree:
     for cube, content in record.cubes.items():
         for name in _CUBE_FIELDS:
             arrays[f"cubes/{cube}/{name}"] = getattr(content, name)
+    optional, lists, numbers = section_arrays(WORKSPACE, record)
     return assemble(
         WORKSPACE,
-        arrays=arrays,
+        arrays={**arrays, **optional},
         attributes={"method": record.method},
-        labels={"joint_names": record.joint_names, "body_pairs": record.body_pairs},
+        labels={
+            "joint_names": record.joint_names,
+            "body_pairs": record.body_pairs,
+            **lists,
+        },
+        numbers=numbers,
         stamp=record.stamp,
         provenance=record.provenance,
         run=record.run,
@@ -259,13 +281,15 @@ def read_workspace_map(path: Path) -> WorkspaceMap:
 
 def workspace_map_from_tree(tree: Tree, path: Path) -> WorkspaceMap:
     """Turn a checked tree into a record; ``path`` is named in messages."""
+    arrays: dict[str, Any] = {name: tree.array(name) for name in _STITCHED}
     return WorkspaceMap(
         cubes=cubes_from_tree(tree),
-        **{name: tree.array(name) for name in _STITCHED},
+        **arrays,
         joint_names=tuple(tree.attributes["joint_names"]),
         body_pairs=tuple(tree.attributes["body_pairs"]),
         method=str(tree.attributes["method"]),
         stamp=stamp_of(tree),
         provenance=provenance_of(tree, path),
         run=run_of(tree, path),
+        **sections_of(WORKSPACE, tree),
     )

@@ -1,0 +1,197 @@
+"""Parts of the maps that a file holds as a whole or not at all."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from reachmap._typing import CodeArray, FloatArray, IntArray
+
+
+def freeze(record: Any) -> None:
+    """Make every array of a dataclass read-only (for ``__post_init__``)."""
+    for item in dataclasses.fields(record):
+        value = getattr(record, item.name)
+        if isinstance(value, np.ndarray):
+            value.setflags(write=False)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PathStore:
+    """Ragged store of joint paths (CF contiguous ragged array).
+
+    Attributes
+    ----------
+    configuration : array, shape (points, dof)
+        Way-points of all paths, one after another [rad].
+    row_size : int array, shape (paths,)
+        Number of way-points of each path.
+    planned_size : int array, shape (paths,)
+        How many of them, from the first, are the planned part; the rest is the
+        straight approach.
+    index : int array, shape (paths, 5)
+        layer, y, x, orientation, repeat of each path; repeat is -1 where the path is
+        no attempt: the roadmap's own, or a later stage of the cycle.
+    stage : uint8 array, shape (paths,), or None
+        0: to the grasp; 1, 2, …: the stages of the cycle, in order.
+    """
+
+    configuration: FloatArray
+    row_size: IntArray
+    planned_size: IntArray
+    index: IntArray
+    stage: CodeArray | None = None
+
+    def __post_init__(self) -> None:
+        freeze(self)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Components:
+    """Connected components of the roadmap: the evidence behind ``no_path_found``.
+
+    Attributes
+    ----------
+    attempts, checks : int array, shape (components,)
+        Searches that were made for the component, and the state checks they took.
+    reached : uint8 array, shape (components,)
+        1 where one of them arrived.
+    agreed : uint8 array, shape (components,)
+        1 where a method that shares nothing with the first was asked, too, and came
+        to the same verdict.
+    method_checks : int array, shape (components, methods)
+        State checks by each method; they add up to ``checks``.
+    methods : tuple of str
+    """
+
+    attempts: IntArray
+    checks: IntArray
+    reached: CodeArray
+    agreed: CodeArray
+    method_checks: IntArray
+    methods: tuple[str, ...]
+
+    def __post_init__(self) -> None:
+        freeze(self)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Effort:
+    """State checks of each attempt.
+
+    Attributes
+    ----------
+    checks : int array, shape (nl, ny, nx, no, nr)
+        0 where nothing was sought.
+    seconds_per_check : float
+        Nominal cost of one check [s], by which checks read as seconds. It is a
+        constant, not a measurement.
+    """
+
+    checks: IntArray
+    seconds_per_check: float
+
+    def __post_init__(self) -> None:
+        freeze(self)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BestPaths:
+    """The path that a line would run to each test grasp, of whatever origin.
+
+    Attributes
+    ----------
+    row : int array, shape (nl, ny, nx, no)
+        Row of the path store, -1 where there is none.
+    path_length, execution_time : array, same shape
+        Of that path [rad], [s]; NaN where there is none.
+    effort_checks : int array, same shape
+        State checks that it took; 0 where there is none.
+    """
+
+    row: IntArray
+    path_length: FloatArray
+    execution_time: FloatArray
+    effort_checks: IntArray
+
+    def __post_init__(self) -> None:
+        freeze(self)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ApproachTimes:
+    """Time optima of the straight ways in and out.
+
+    Attributes
+    ----------
+    approach, retreat : array, shape (nl, ny, nx, no, nr)
+        [s], NaN where no path.
+    """
+
+    approach: FloatArray
+    retreat: FloatArray
+
+    def __post_init__(self) -> None:
+        freeze(self)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Margins:
+    """How far the best path and its goal stay from what would end them.
+
+    Attributes
+    ----------
+    clearance : array, shape (nl, ny, nx, no)
+        Least distance of two bodies on the path [m], NaN where no path.
+    clearance_pair : int array, same shape
+        Index of these bodies into ``body_pairs``, -1 where there are none.
+    joint_margin : array, same shape
+        Least distance to a joint limit at the goal and on the straight approach [rad].
+    smallest_singular_value : array, same shape
+        Of the TCP Jacobian (m and rad), least at the goal and on the approach.
+    """
+
+    clearance: FloatArray
+    clearance_pair: IntArray
+    joint_margin: FloatArray
+    smallest_singular_value: FloatArray
+
+    def __post_init__(self) -> None:
+        freeze(self)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Cycle:
+    """What follows the grasp until the robot is back.
+
+    Attributes
+    ----------
+    stages : tuple of str
+        Names, in order; stage k is numbered k + 1 in the path store.
+    status : uint8 array, shape (nl, ny, nx, no, stages)
+        :class:`~reachmap.maps.records.Status` codes.
+    blocking_pair : int array, same shape
+    time, length : array, same shape
+        [s], [rad]; NaN unless the stage has a path.
+    drop_off : int array, shape (nl, ny, nx, no)
+        Index of the place where the part goes, -1 where it goes nowhere.
+    cycle_time : array, shape (nl, ny, nx, no)
+        [s], NaN unless every stage has a path.
+    reachability : array, shape (nl, ny, nx)
+        Test grasps with a whole cycle [percent].
+    """
+
+    stages: tuple[str, ...]
+    status: CodeArray
+    blocking_pair: IntArray
+    time: FloatArray
+    length: FloatArray
+    drop_off: IntArray
+    cycle_time: FloatArray
+    reachability: FloatArray
+
+    def __post_init__(self) -> None:
+        freeze(self)
