@@ -46,6 +46,7 @@ HOMES = {
     "trimesh": ("reachmap.view.",),
     "xacro": ("reachmap.cell.",),
     "ruamel": ("reachmap.cell.text.", "reachmap.ranking.lists."),
+    "jinja2": ("reachmap.report.page",),
     "simpleeval": ("reachmap.cell.text.expressions",),
     "distributed": ("reachmap.runtime.",),
     "dask": ("reachmap.runtime.",),

@@ -107,7 +107,7 @@ def leave_drawing_out(patch: pytest.MonkeyPatch) -> None:
         for name in names:
             patch.setattr(f"reachmap.report.{part}.{name}", lambda *a, **k: None)
     patch.setattr(
-        "reachmap.report.markup.figure_bytes", lambda *a, **k: b"\x89PNG" + bytes(20)
+        "reachmap.report.blocks.figure_bytes", lambda *a, **k: b"\x89PNG" + bytes(20)
     )
 
 

@@ -6,41 +6,28 @@ import numpy as np
 
 from reachmap.maps.summary.placement import summarise_placement
 from reachmap.maps.summary.statistics import best_level, level_means, saturation_of
+from reachmap.report.blocks import Tile
 from reachmap.report.folder import RunFolder
-from reachmap.report.markup import Html, element, joined, paragraph
 from reachmap.report.numbers import count, interval, number, percent, signed
 from reachmap.report.ranked_rows import ranked_rows
 
 FIRST_PICKS = 3
 
 
-def headline_answers(run: RunFolder) -> Html:
+def headline_answers(run: RunFolder) -> list[Tile]:
     """Tiles: best level, bin, share of test grasps, first picks."""
-    tiles = (_level(run), _bin(run), _share(run), _picks(run))
-    return element("div", joined(tiles), class_="answers")
+    return [_level(run), _bin(run), _share(run), _picks(run)]
 
 
-def _tile(question: str, reply: str, *why: str) -> Html:
-    return element(
-        "div",
-        paragraph(question, kind="question"),
-        paragraph(reply, kind="reply"),
-        *(paragraph(line, kind="why") for line in why if line),
-        class_="answer",
-    )
+def _tile(question: str, reply: str, *why: str) -> Tile:
+    return Tile(question, reply, why)
 
 
-def _absent(question: str, why: str) -> Html:
-    return element(
-        "div",
-        paragraph(question, kind="question"),
-        paragraph("not known yet", kind="reply"),
-        paragraph(why, kind="why"),
-        class_="answer absent",
-    )
+def _absent(question: str, why: str) -> Tile:
+    return Tile(question, "not known yet", (why,), absent=True)
 
 
-def _level(run: RunFolder) -> Html:
+def _level(run: RunFolder) -> Tile:
     question = "Which height does the arm reach best?"
     if run.workspace is None:
         return _absent(question, "There is no workspace map in this folder.")
@@ -59,7 +46,7 @@ def _level(run: RunFolder) -> Html:
     )
 
 
-def _bin(run: RunFolder) -> Html:
+def _bin(run: RunFolder) -> Tile:
     question = "Where does the bin go?"
     if run.placement is None:
         return _absent(question, "There is no placement in this folder.")
@@ -86,7 +73,7 @@ def _bin(run: RunFolder) -> Html:
     )
 
 
-def _share(run: RunFolder) -> Html:
+def _share(run: RunFolder) -> Tile:
     question = "How much of the bin is really reached?"
     if run.bin_map is None:
         return _absent(question, "There is no bin map in this folder.")
@@ -102,7 +89,7 @@ def _share(run: RunFolder) -> Html:
     )
 
 
-def _picks(run: RunFolder) -> Html:
+def _picks(run: RunFolder) -> Tile:
     question = "Which grasps come first?"
     if not run.ranked:
         return _absent(question, "There is no ranked grasp list in this folder.")

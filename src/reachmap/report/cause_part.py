@@ -10,11 +10,13 @@ from reachmap.maps.summary.statistics import (
     ik_approximation,
 )
 from reachmap.plots.causes import draw_causes
-from reachmap.report.markup import (
-    Html,
+from reachmap.report.blocks import (
+    Blocks,
+    Heading,
+    Section,
+    Table,
     drawn,
-    element,
-    joined,
+    group,
     paragraph,
     section,
     table,
@@ -24,7 +26,7 @@ from reachmap.report.numbers import percent
 PAIRS_SHOWN = 8
 
 
-def cause_section(maps: dict[str, WorkspaceMap | BinMap]) -> Html:
+def cause_section(maps: dict[str, WorkspaceMap | BinMap]) -> Section:
     """Say of each map why its test frames are not reached.
 
     Parameters
@@ -32,14 +34,14 @@ def cause_section(maps: dict[str, WorkspaceMap | BinMap]) -> Html:
     maps : mapping
         Heading to map.
     """
-    parts = []
+    parts: list[Blocks] = []
     for name, record in maps.items():
         causes = causes_of(record)
         parts += [
-            element("h3", name),
+            Heading(name),
             paragraph(_words(causes)),
             drawn(draw_causes(record), f"{name}: states and causes.", record),
-            element("div", _states(causes), _pairs(causes), class_="pair"),
+            group("pair", _states(causes), _pairs(causes)),
         ]
     return section(
         "causes",
@@ -50,7 +52,7 @@ def cause_section(maps: dict[str, WorkspaceMap | BinMap]) -> Html:
             "lower wall or another place would free it. Where no path was found, the "
             "pose is free, but planning did not get there with the effort stored below."
         ),
-        joined(parts),
+        parts,
     )
 
 
@@ -75,7 +77,7 @@ def _words(causes: Causes) -> str:
     return f"Most often in the way: {bodies} ({percent(share)} of the poses)."
 
 
-def _states(causes: Causes) -> Html:
+def _states(causes: Causes) -> Table:
     rows = [
         (STATUS_NAMES[code], count, percent(100.0 * count / max(causes.total, 1)))
         for code, count in causes.states.items()
@@ -83,8 +85,8 @@ def _states(causes: Causes) -> Html:
     return table(("state", "poses", "share"), rows, "<>>")
 
 
-def _pairs(causes: Causes) -> Html:
+def _pairs(causes: Causes) -> Table | None:
     if not causes.pairs:
-        return Html("")
+        return None
     rows = [(pair.replace(" | ", " – "), n) for pair, n in causes.pairs[:PAIRS_SHOWN]]
     return table(("bodies in contact", "poses"), rows, "<>")

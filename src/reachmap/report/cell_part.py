@@ -10,10 +10,12 @@ from reachmap.core.collision.solids import SolidCell
 from reachmap.errors import ReachmapError
 from reachmap.maps.format.registry import Artefact
 from reachmap.plots.cell.cell_view import draw_cell
-from reachmap.report.markup import (
-    Html,
+from reachmap.report.blocks import (
+    Block,
+    Heading,
+    Section,
+    Table,
     drawn,
-    element,
     facts,
     paragraph,
     section,
@@ -24,7 +26,7 @@ from reachmap.report.numbers import count, number, signed
 TITLE = "The cell"
 
 
-def cell_section(loaded: LoadedCell | str, record: Artefact) -> Html:
+def cell_section(loaded: LoadedCell | str, record: Artefact) -> Section:
     """Describe and draw a cell.
 
     Parameters
@@ -43,12 +45,12 @@ def cell_section(loaded: LoadedCell | str, record: Artefact) -> Html:
         TITLE,
         _picture(loaded, record),
         _facts(loaded),
-        element("h3", "Bodies"),
+        Heading("Bodies"),
         _bodies(loaded),
     )
 
 
-def _picture(loaded: LoadedCell, record: Artefact) -> Html:
+def _picture(loaded: LoadedCell, record: Artefact) -> Block:
     try:
         cell = SolidCell.build(loaded)
     except ReachmapError as error:
@@ -61,7 +63,7 @@ def _picture(loaded: LoadedCell, record: Artefact) -> Html:
     )
 
 
-def _facts(loaded: LoadedCell) -> Html:
+def _facts(loaded: LoadedCell) -> Table | None:
     cell = loaded.cell
     robot, camera, tray = cell.robot, cell.camera, cell.bin
     joints = loaded.scan_configuration_rad
@@ -118,7 +120,7 @@ def _position(xyz: tuple[float, ...]) -> str:
     return f"x {x}, y {y}, z {z} m"
 
 
-def _bodies(loaded: LoadedCell) -> Html:
+def _bodies(loaded: LoadedCell) -> Block:
     rows = [
         (body.name, body.attach_to, _shape_words(body.shape), _position(body.pose.xyz))
         for body in loaded.cell.bodies

@@ -23,11 +23,13 @@ from reachmap.plots.saturation import draw_saturation
 from reachmap.ranking.lookup.costs import grasp_costs
 from reachmap.ranking.lookup.settings import RankSettings
 from reachmap.ranking.lookup.table import table_from_bin_map
-from reachmap.report.markup import (
-    Html,
+from reachmap.report.blocks import (
+    Blocks,
+    Heading,
+    Section,
+    Strong,
+    Table,
     drawn,
-    element,
-    joined,
     paragraph,
     section,
     table,
@@ -37,7 +39,7 @@ from reachmap.report.numbers import MINUS, count, interval, number, percent, sig
 REASONS_SHOWN = 6
 
 
-def workspace_section(record: WorkspaceMap) -> Html:
+def workspace_section(record: WorkspaceMap) -> Section:
     """Levels in numbers, the best one and all of them as pictures."""
     summary = summarise_workspace(record)
     stack = stack_of(record, "path")
@@ -65,17 +67,17 @@ def workspace_section(record: WorkspaceMap) -> Html:
             "more; the difference is what camera, tool and surroundings take away."
         ),
         _level_table(summary),
-        joined(pictures),
+        pictures,
     )
 
 
-def _level_table(summary: WorkspaceSummary) -> Html:
+def _level_table(summary: WorkspaceSummary) -> Table:
     names = level_names(np.array([level.z for level in summary.levels]))
     rows = []
     for index in reversed(range(len(summary.levels))):
         level = summary.levels[index]
         name = names[index].replace("-", MINUS)
-        mark = element("b", f"{name} (best)") if index == summary.best_level else name
+        mark = Strong(f"{name} (best)") if index == summary.best_level else name
         rows.append(
             (
                 mark,
@@ -89,7 +91,7 @@ def _level_table(summary: WorkspaceSummary) -> Html:
     return table(head, rows, "<>>>>")
 
 
-def placement_section(record: BinPlacement, workspace: WorkspaceMap | None) -> Html:
+def placement_section(record: BinPlacement, workspace: WorkspaceMap | None) -> Section:
     """Chosen pose, its margin and its rivals.
 
     Parameters
@@ -108,7 +110,7 @@ def placement_section(record: BinPlacement, workspace: WorkspaceMap | None) -> H
             "score is the mean path reachability over the pick volume."
         ),
         _candidate_table(summary),
-        element("h3", "Margin"),
+        Heading("Margin"),
         paragraph(_margin_words(summary)),
         drawn(
             draw_placement(record, workspace),
@@ -119,7 +121,7 @@ def placement_section(record: BinPlacement, workspace: WorkspaceMap | None) -> H
     )
 
 
-def _candidate_table(summary: PlacementSummary) -> Html:
+def _candidate_table(summary: PlacementSummary) -> Blocks:
     named = (
         ("chosen", summary.chosen),
         ("runner-up", summary.runner_up),
@@ -130,12 +132,12 @@ def _candidate_table(summary: PlacementSummary) -> Html:
     words = table(head, rows, "<>>>>>>>")
     if summary.runner_up is not None:
         return words
-    return joined([words, paragraph("There is no runner-up.", kind="muted")])
+    return [words, paragraph("There is no runner-up.", kind="muted")]
 
 
 def _candidate_row(name: str, one: CandidateSummary) -> tuple[object, ...]:
     return (
-        element("b", name) if name == "chosen" else name,
+        Strong(name) if name == "chosen" else name,
         *(signed(value, 3) for value in (one.x, one.y, one.z)),
         f"{number(one.yaw_deg, 0)}°",
         percent(one.score),
@@ -158,19 +160,17 @@ def _margin_words(summary: PlacementSummary) -> str:
     )
 
 
-def _excluded(summary: PlacementSummary) -> Html:
+def _excluded(summary: PlacementSummary) -> Blocks:
     if not summary.excluded:
-        return Html("")
+        return None
     rows = [(reason, number) for reason, number in summary.excluded.items()]
-    return joined(
-        [
-            element("h3", "Why other places are out of the question"),
-            table(("reason", "poses"), rows[:REASONS_SHOWN], "<>"),
-        ]
-    )
+    return [
+        Heading("Why other places are out of the question"),
+        table(("reason", "poses"), rows[:REASONS_SHOWN], "<>"),
+    ]
 
 
-def bin_section(record: BinMap) -> Html:
+def bin_section(record: BinMap) -> Section:
     """Reachability, attempts, costs and approach directions inside the bin."""
     summary = summarise_bin(record)
     weights = RankSettings().weights
@@ -204,23 +204,23 @@ def bin_section(record: BinMap) -> Html:
             f"{count(summary.repeats, 'attempt')} at each: {summary.reachable} reached."
         ),
         _quadrant_table(summary),
-        joined(pictures),
+        pictures,
         drawn(
             draw_saturation(record),
             "How the share grows with the number of attempts; bars are 95 % intervals.",
             record,
         ),
-        element("h3", "What a pick takes"),
+        Heading("What a pick takes"),
         _measure_table(summary),
     )
 
 
-def _quadrant_table(summary: BinSummary) -> Html:
+def _quadrant_table(summary: BinSummary) -> Table:
     rows = []
     parts = [(q.name, q.saturation, q.measures) for q in summary.quadrants]
     for name, found, measures in [
         *parts,
-        (element("b", "whole bin"), summary.saturation, summary.measures),
+        (Strong("whole bin"), summary.saturation, summary.measures),
     ]:
         if found.total:
             planning = MEASURES["planning_cpu_time"].of(measures["planning_cpu_time"])
@@ -240,7 +240,7 @@ def _quadrant_table(summary: BinSummary) -> Html:
     return table(head, rows, "<>>>>>>")
 
 
-def _measure_table(summary: BinSummary) -> Html:
+def _measure_table(summary: BinSummary) -> Table:
     rows = []
     for name, shown in MEASURES.items():
         spread = shown.of(summary.measures[name])

@@ -6,16 +6,25 @@ from collections.abc import Mapping
 from typing import Any
 
 from reachmap.maps.format.registry import Artefact, kind_of
+from reachmap.report.blocks import (
+    Code,
+    Heading,
+    Section,
+    Table,
+    facts,
+    group,
+    paragraph,
+    section,
+)
 from reachmap.report.folder import RunFolder
-from reachmap.report.markup import Html, element, facts, joined, paragraph, section
 from reachmap.report.numbers import number
 
 
-def origin_section(run: RunFolder) -> Html:
+def origin_section(run: RunFolder) -> Section:
     """Say of every artefact how it was made."""
     parts = []
     for role, record in run.artefacts.items():
-        parts += [element("h3", run.files[role]), _facts(record)]
+        parts += [Heading(run.files[role]), _facts(record)]
     return section(
         "provenance",
         "Settings and provenance",
@@ -23,17 +32,17 @@ def origin_section(run: RunFolder) -> Html:
             "Each file keeps the cell, the robot description and all settings it was "
             "made with. Equal contents have equal hashes on every machine."
         ),
-        element("div", joined(parts), class_="small"),
+        group("small", parts),
     )
 
 
-def _facts(record: Artefact) -> Html:
+def _facts(record: Artefact) -> Table | None:
     stamp, kept, run = record.stamp, record.provenance, record.run
     return facts(
         [
             ("kind", f"{kind_of(record).replace('_', ' ')}, {stamp.format_version}"),
-            ("content", element("code", stamp.content_sha256 or "-")),
-            ("cell", element("code", stamp.cell_sha256)),
+            ("content", Code(stamp.content_sha256 or "-")),
+            ("cell", Code(stamp.cell_sha256)),
             ("made from", _code(kept.source_sha256)),
             ("overrides", ", ".join(kept.overrides)),
             ("seed", stamp.seed),
@@ -54,8 +63,8 @@ def _seconds(phases: Mapping[str, float]) -> str:
     )
 
 
-def _code(value: str) -> Html:
-    return element("code", value) if value else Html("")
+def _code(value: str) -> str:
+    return Code(value) if value else ""
 
 
 def _command(line: str) -> str:

@@ -11,11 +11,12 @@ from reachmap._typing import FloatArray
 from reachmap.maps.format.registry import Artefact
 from reachmap.plots.ranking import MAX_GROUPS, TERM_LABELS, CostGroup, ranking_chart
 from reachmap.ranking.answers.ranked_list import QUADRANT_ORDER, TERM_NAMES
-from reachmap.report.markup import (
-    Html,
+from reachmap.report.blocks import (
+    Blocks,
+    Heading,
+    Section,
+    Table,
     drawn,
-    element,
-    joined,
     paragraph,
     section,
     table,
@@ -26,7 +27,9 @@ from reachmap.report.ranked_rows import RankedRow, ranked_rows, weights_of
 TOP = 10
 
 
-def ranking_section(documents: Sequence[Mapping[str, Any]], record: Artefact) -> Html:
+def ranking_section(
+    documents: Sequence[Mapping[str, Any]], record: Artefact
+) -> Section:
     """First grasps of each list, and what ranking them saved.
 
     Parameters
@@ -36,12 +39,12 @@ def ranking_section(documents: Sequence[Mapping[str, Any]], record: Artefact) ->
     record : WorkspaceMap, BinMap or BinPlacement
         Whose hash the chart keeps.
     """
-    parts: list[Html] = []
+    parts: list[Blocks] = []
     groups: list[CostGroup] = []
     for index, document in enumerate(documents):
         name = f"List {index + 1}" if len(documents) > 1 else ""
         if name:
-            parts.append(element("h3", name))
+            parts.append(Heading(name))
         parts += [paragraph(_words(document)), _table(document)]
         groups += _groups(document, name)
     if groups:
@@ -53,7 +56,7 @@ def ranking_section(documents: Sequence[Mapping[str, Any]], record: Artefact) ->
                 record,
             )
         )
-    return section("ranking", "Which grasps come first", joined(parts))
+    return section("ranking", "Which grasps come first", parts)
 
 
 def _words(document: Mapping[str, Any]) -> str:
@@ -68,7 +71,7 @@ def _words(document: Mapping[str, Any]) -> str:
     )
 
 
-def _table(document: Mapping[str, Any]) -> Html:
+def _table(document: Mapping[str, Any]) -> Table:
     rows = [
         (
             NONE if row.rank is None else row.rank,

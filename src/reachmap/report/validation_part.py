@@ -5,7 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from reachmap.report.markup import Html, element, paragraph, section, table
+from reachmap.report.blocks import (
+    Heading,
+    Section,
+    Table,
+    paragraph,
+    section,
+    table,
+)
 from reachmap.report.numbers import NONE, number, percent, signed
 from reachmap.report.ranked_rows import known_number
 
@@ -16,7 +23,7 @@ SHARES = {
 }
 
 
-def validation_section(facts: Mapping[str, Any]) -> Html:
+def validation_section(facts: Mapping[str, Any]) -> Section:
     """Figures of a ``validation.json``.
 
     Parameters
@@ -39,7 +46,7 @@ def validation_section(facts: Mapping[str, Any]) -> Html:
             "(Wilson)."
         ),
         _list_table(lists),
-        element("h3", "The first grasps in each order, as measured") if groups else "",
+        Heading("The first grasps in each order, as measured") if groups else "",
         _group_table(groups) if groups else "",
         paragraph(
             "The re-ranked first grasps are cheaper than the supplied ones in "
@@ -50,7 +57,7 @@ def validation_section(facts: Mapping[str, Any]) -> Html:
     )
 
 
-def _list_table(lists: list[dict[str, Any]]) -> Html:
+def _list_table(lists: list[dict[str, Any]]) -> Table:
     rows = []
     for one in lists:
         confusion = _mapping(one, "confusion")
@@ -75,7 +82,7 @@ def _share_words(share: Mapping[str, Any]) -> str:
     return f"{percent(said[0])} ({number(said[1], 1)} to {number(said[2], 1)})"
 
 
-def _group_table(groups: list[dict[str, Any]]) -> Html:
+def _group_table(groups: list[dict[str, Any]]) -> Table:
     rows = []
     for group in groups:
         label: object = str(group.get("group", ""))
