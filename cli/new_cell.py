@@ -10,8 +10,51 @@ import click
 from reachmap.cli.options import json_option, output_option, overwrite_option
 
 
+def _pairs(
+    ctx: click.Context, parameter: click.Parameter, values: tuple[str, ...]
+) -> dict[str, str]:
+    """Split ``NAME=VALUE``, or ``name:=value`` as ROS writes it."""
+    pairs: dict[str, str] = {}
+    for text in values:
+        name, equals, value = text.partition("=")
+        name = name.removesuffix(":")
+        if not equals or not name:
+            usual = "NAME:=VALUE" if parameter.param_type_name == "argument" else None
+            raise click.BadParameter(
+                f"{text!r} is not {usual or parameter.metavar}", ctx, parameter
+            )
+        if pairs.setdefault(name, value) != value:
+            raise click.BadParameter(f"{name!r} is given twice", ctx, parameter)
+    return pairs
+
+
 @click.command()
 @click.argument("urdf")
+@click.argument("arguments", nargs=-1, callback=_pairs, metavar="[NAME:=VALUE]...")
+@click.option(
+    "--package",
+    "packages",
+    multiple=True,
+    callback=_pairs,
+    metavar="NAME=FOLDER",
+    help="Where package://NAME and $(find NAME) lead. Repeatable; needed only for "
+    "packages that do not lie around the URDF.",
+)
+@click.option(
+    "--xacro-arg",
+    "xacro_args",
+    multiple=True,
+    callback=_pairs,
+    metavar="NAME=VALUE",
+    help="Argument of a xacro file. Repeatable; NAME:=VALUE after URDF is the same.",
+)
+@click.option(
+    "--moveit-config",
+    metavar="FOLDER",
+    type=click.Path(path_type=Path),
+    help="Take SRDF, joint limits, named states and planning-scene bodies from a "
+    "MoveIt configuration.",
+)
 @click.option(
     "--base", metavar="LINK", help="Link to measure from; by default guessed."
 )
@@ -23,6 +66,10 @@ from reachmap.cli.options import json_option, output_option, overwrite_option
 @json_option
 def command(
     urdf: str,
+    arguments: dict[str, str],
+    packages: dict[str, str],
+    xacro_args: dict[str, str],
+    moveit_config: Path | None,
     base: str | None,
     tip: str | None,
     output: Path,
@@ -33,29 +80,50 @@ def command(
 
     URDF is the path of a .urdf or .xacro file, or package://NAME/PATH. Chain, joints,
     limits, a bin and a free scan configuration are filled in; what had to be guessed
-    is marked GUESS. If links touch in every position, an SRDF that says so is written
-    beside the cell.
+    is marked GUESS. Packages and xacro arguments that are given here are written into
+    the cell. If links touch in every position, an SRDF that says so is written beside
+    the cell. Exits with 2 where the cell cannot work yet: one that cannot be loaded is
+    not written, one that can is written and what is to be mended is listed.
 
-    Example: reachmap new-cell robot.urdf -o cell.yaml
+    Example: reachmap new-cell ur.urdf.xacro name:=ur ur_type:=ur10e -o cell.yaml
     """
+    from reachmap.errors import SceneError
     from reachmap.tools.new_cell import new_cell
 
-    made = new_cell(urdf, output=output, base=base, tip=tip, overwrite=overwrite)
+    made = new_cell(
+        urdf,
+        output=output,
+        base=base,
+        tip=tip,
+        packages=packages,
+        xacro_args={**arguments, **xacro_args},
+        moveit_config=moveit_config,
+        overwrite=overwrite,
+    )
+    for note in made.notes:
+        click.echo(f"note: {note}", err=True)
     if as_json:
         answer = {
             "output": str(made.path),
             "srdf": None if made.srdf_path is None else str(made.srdf_path),
             "base": made.base,
             "tip": made.tip,
+            "approach_axis": made.approach_axis,
             "joints": made.joints,
+            "packages": dict(made.packages),
+            "notes": made.notes,
             "problems": made.problems,
         }
         click.echo(json.dumps(answer))
-        return
-    count = len(made.joints)
-    click.echo(f"{made.path}: {count} joints from {made.base} to {made.tip}")
-    if made.srdf_path is not None:
-        click.echo(f"{made.srdf_path}: links that touch in every position")
-    for problem in made.problems:
-        click.echo(f"to be mended: {problem}")
-    click.echo(f"next: edit the lines marked GUESS, then reachmap check {made.path}")
+    else:
+        count = len(made.joints)
+        joints = "joint" if count == 1 else "joints"
+        click.echo(f"{made.path}: {count} {joints} from {made.base} to {made.tip}")
+        if made.srdf_path is not None:
+            click.echo(f"{made.srdf_path}: links that touch in every position")
+        done = "mend what is listed" if made.problems else "edit the lines marked GUESS"
+        click.echo(f"next: {done}, then reachmap check {made.path}")
+    if made.problems:
+        raise SceneError(
+            f"{made.path}: to be mended: {problem}" for problem in made.problems
+        )

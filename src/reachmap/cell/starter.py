@@ -8,12 +8,9 @@ import textwrap
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from reachmap.cell.files.urdf import UrdfDescription, UrdfJoint
+from reachmap.cell.files.urdf import UrdfJoint
 from reachmap.cell.text.yaml_writer import WIDTH, scalar
-from reachmap.errors import SettingsError
 
-# Names that tool flanges have in published robot descriptions, best first.
-TIP_NAMES = ("tool0", "tcp", "flange", "hand_tcp", "ee_link", "end_effector", "tool")
 SEVEN_AXES = 7
 
 
@@ -23,62 +20,50 @@ class StarterChoices:
 
     Attributes
     ----------
-    urdf, srdf : str
-        References as they are written; srdf may be "".
+    urdf, srdf, joint_limits : str
+        References as they are written; the last two may be "".
+    packages : mapping
+        Package name to folder, as it is written.
+    xacro_args : mapping
+        Argument of a xacro file to value.
     base, tip : str
         Links.
     joints : tuple of UrdfJoint
         Joints that move, base first.
     locked : dict
         Other moving joints to their positions [deg or m].
+    approach_axis : str
+        Axis of the tip that points into the object.
     reach_m : float
         How far the TCP gets from the base axis.
+    bin_xyz_m, bin_yaw_deg : tuple of float, float
+        Where the bin stands.
     scan_deg : dict
         Joint to position in the scan configuration [deg or m].
+    states : tuple of str
+        Named configurations of the SRDF; the first is the scan configuration.
+    bodies : tuple of str
+        Bodies as lines of YAML.
     """
 
     name: str
     urdf: str
     srdf: str = ""
+    joint_limits: str = ""
+    packages: Mapping[str, str] = field(default_factory=dict)
+    xacro_args: Mapping[str, str] = field(default_factory=dict)
     base: str
     root: str
     tip: str
     joints: tuple[UrdfJoint, ...]
     locked: Mapping[str, float] = field(default_factory=dict)
+    approach_axis: str = "+z"
     reach_m: float = 1.0
+    bin_xyz_m: tuple[float, float, float] | None = None
+    bin_yaw_deg: float = 90.0
     scan_deg: Mapping[str, float] = field(default_factory=dict)
-
-
-def guess_base(robot: UrdfDescription) -> str:
-    """Link to measure from: the root, or what a root named world carries."""
-    below = [j for j in robot.joints.values() if j.parent == robot.root]
-    if robot.root == "world" and len(below) == 1 and below[0].type == "fixed":
-        return below[0].child
-    return robot.root
-
-
-def guess_tip(robot: UrdfDescription, base: str) -> str:
-    """Link to carry the tool: a well-known name, else the end of the longest chain.
-
-    Raises
-    ------
-    SettingsError
-        No joint moves.
-    """
-
-    def rank(link: str) -> tuple[int, int]:
-        turning = [
-            name for name in robot.chain(base, link) if _turns(robot.joints[name])
-        ]
-        known = [k for k, name in enumerate(TIP_NAMES) if link.lower().endswith(name)]
-        return (len(turning), -min(known, default=len(TIP_NAMES)))
-
-    tip = max(robot.links, key=rank)
-    if not robot.chain(base, tip):
-        raise SettingsError(
-            f"{robot.name}: the URDF has no joint that moves anything against {base!r}"
-        )
-    return tip
+    states: tuple[str, ...] = ()
+    bodies: tuple[str, ...] = ()
 
 
 def middle_position(joint: UrdfJoint) -> float:
@@ -130,8 +115,15 @@ description: {scalar(f"{c.name} with a bin in front of it")}
 
 
 def _robot(c: StarterChoices) -> str:
-    lines = ["robot:", f"  urdf: {scalar(c.urdf)}"]
-    if c.srdf:
+    lines = []
+    if c.packages:
+        lines += ["resources:", f"  packages: {scalar(dict(c.packages))}"]
+    lines += ["robot:", f"  urdf: {scalar(c.urdf)}"]
+    if c.xacro_args:
+        lines.append(f"  xacro_args: {scalar(dict(c.xacro_args))}")
+    if c.srdf and c.joint_limits:
+        lines.append(f"  srdf: {scalar(c.srdf)}")
+    elif c.srdf:
         lines.append(
             "  # Pairs of links that touch in every position are disabled here."
         )
@@ -146,7 +138,7 @@ def _robot(c: StarterChoices) -> str:
         "  # GUESS: the link that carries the tool, the tool centre point in its",
         "  # frame, and the axis of it that points into the object.",
         f"  tcp: {{parent: {scalar(c.tip)}, xyz: [0, 0, 0], "
-        f'approach_axis: "{approach_axis(c.tip)}"}}',
+        f'approach_axis: "{c.approach_axis}"}}',
     ]
     names = ", ".join(joint.name for joint in c.joints)
     lines += textwrap.wrap(
@@ -168,11 +160,6 @@ def _robot(c: StarterChoices) -> str:
     return "\n".join(lines) + "\n"
 
 
-def approach_axis(tip: str) -> str:
-    """Approach axis of a link by its name: x for the old ROS ee_link, else z."""
-    return "+x" if tip.lower().endswith("ee_link") else "+z"
-
-
 def _limits(c: StarterChoices) -> list[str]:
     slow = [j.name for j in c.joints if not j.velocity or j.velocity <= 0]
     unbounded = [j for j in c.joints if j.lower is None or j.upper is None]
@@ -184,6 +171,9 @@ def _limits(c: StarterChoices) -> list[str]:
         lines.append("    # Velocities are those of the URDF; tighten them here.")
         lines.append("    # velocity_rad_s: 2.0")
     lines.append("    acceleration_rad_s2: 5.0   # GUESS: a URDF cannot hold them")
+    if c.joint_limits:
+        lines.insert(0, f"  joint_limits: {scalar(c.joint_limits)}")
+        lines[-1] += "; or MoveIt's, if lower"
     if unbounded:
         table = {joint.name: _range(joint) for joint in unbounded}
         lines.append("    # GUESS: the URDF sets no end to these joints.")
@@ -203,22 +193,29 @@ def _range(joint: UrdfJoint) -> list[float]:
     return [round(low, 3), round(high, 3)]
 
 
-def _bin_numbers(c: StarterChoices) -> tuple[list[float], list[float], float]:
-    """Inner size and position of the bin, and the largest approach [m]."""
-    size = min(1.0, max(0.1, c.reach_m / 0.9))
-    inner = [round(side * size, 3) for side in (0.36, 0.26, 0.15)]
-    return inner, [round(0.6 * c.reach_m, 3), 0.0, 0.0], round(0.05 * size, 3)
+def bin_size(reach_m: float) -> float:
+    """Share of a usual bin's size that suits an arm: 1 for a reach of 0.9 m or more."""
+    return min(1.0, max(0.1, reach_m / 0.9))
+
+
+def _bin_inner(c: StarterChoices) -> list[float]:
+    """Inner size of the bin [m]."""
+    return [round(side * bin_size(c.reach_m), 3) for side in (0.36, 0.26, 0.15)]
 
 
 def _surroundings(c: StarterChoices) -> str:
-    inner, position, _ = _bin_numbers(c)
+    xyz = c.bin_xyz_m or (round(0.6 * c.reach_m, 3), 0.0, 0.0)
+    pose = {"xyz": list(xyz), "rpy_deg": [0, 0, c.bin_yaw_deg]}
+    bodies = f"{'bodies: []':<30} # what is not in the URDF; replace [] by entries like"
+    if c.bodies:
+        bodies = "\n".join(["bodies:", *c.bodies, "# and others, like"])
     return f"""\
 # camera:                      # the optical frame: z into the scene, x to the right
 #   parent: {c.tip}
 #   xyz: [0, -0.1, 0.05]
 #   range_m: [0.5, 0.6]
 #   field_of_view_deg: [57, 36]
-bodies: []                     # what is not in the URDF; replace [] by entries like
+{bodies}
 #  - name: gripper
 #    attach_to: {c.tip}
 #    shape: {{cylinder: {{radius: 0.015, length: 0.1}}}}
@@ -230,9 +227,9 @@ bodies: []                     # what is not in the URDF; replace [] by entries 
 #    pose: {{xyz: [0, 0, -0.027]}}
 #    touch: [{c.base}, bin]
 bin:                           # GUESS; `reachmap place-bin` finds a good place
-  inner: {scalar(inner)}
+  inner: {scalar(_bin_inner(c))}
   wall: 0.005
-  pose: {{xyz: {scalar(position)}, rpy_deg: [0, 0, 90]}}
+  pose: {scalar(pose)}
 """
 
 
@@ -240,6 +237,12 @@ def _scan(c: StarterChoices) -> str:
     lines = [
         "# GUESS: where the camera looks at the bin from, and where every path starts.",
         "scan_configuration:",
+    ]
+    if c.states:
+        more = f"   # or {', '.join(c.states[1:])}" if c.states[1:] else ""
+        lines.append(f"  group_state: {scalar(c.states[0])}{more}")
+        return "\n".join(lines) + "\n"
+    lines += [
         "  q_deg:",
         *(
             f"    {scalar(joint.name)}: {scalar(c.scan_deg[joint.name])}"
@@ -251,7 +254,7 @@ def _scan(c: StarterChoices) -> str:
 
 def _scans(c: StarterChoices) -> str:
     reach = max(0.05, math.ceil(c.reach_m * 20) / 20)
-    inner, _, _ = _bin_numbers(c)
+    layer = scalar(round(_bin_inner(c)[2] / 3, 3))
     cone = "{family: cone, tilts_deg: [0, 30], azimuths: [1, 8], rolls: 3}"
     low, high = round(-0.4 * reach, 3), round(0.6 * reach, 3)
     side = round(0.85 * reach, 3)
@@ -268,7 +271,7 @@ workspace_scan:
   repeats: 5
 bin_scan:
   grid: [20, 14]
-  layers: [{scalar(round(inner[2] / 3, 3))}]               # heights above the bottom
+  layers: [{layer}]               # heights above the bottom
   orientations: {cone}
   repeats: 5
   approach_distance_m: 0.0     # straight way before the grasp; 0: plan to the grasp

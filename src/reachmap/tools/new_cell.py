@@ -2,40 +2,41 @@
 
 from __future__ import annotations
 
-import dataclasses
-from collections import Counter
-from dataclasses import dataclass
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
 from reachmap._typing import FloatArray
-from reachmap.cell.files.files import robot_text
-from reachmap.cell.files.resources import SCHEME, NotFoundError, Resolver
-from reachmap.cell.files.urdf import UrdfDescription, parse_urdf
+from reachmap.cell.files.moveit_config import planning_group
+from reachmap.cell.files.urdf import UrdfDescription
+from reachmap.cell.guesses import guess_base, guess_tip
 from reachmap.cell.loading import LoadedCell, cell_from_text
 from reachmap.cell.starter import (
     StarterChoices,
-    approach_axis,
     cell_name,
-    guess_base,
-    guess_tip,
     middle_position,
     starter_text,
     user_value,
 )
 from reachmap.cell.text.messages import did_you_mean
+from reachmap.cell.text.yaml_writer import scalar
 from reachmap.core.kinematics.kinematics import Kinematics
 from reachmap.core.robot.model import RobotModel
 from reachmap.core.scene import Scene
-from reachmap.errors import ReachmapError, SettingsError
-from reachmap.geometry import AXES
-from reachmap.maps.bytes.publish import check_output, check_outputs, publish
+from reachmap.errors import CellError, ReachmapError, SceneError, SettingsError
+from reachmap.geometry import quaternion_wxyz_from_rotation
+from reachmap.maps.bytes.publish import check_output, publish
+from reachmap.tools import trial
+from reachmap.tools.robot_source import RobotSource, read_source
 
-SAMPLES = 2000
-MANY = 40
-ALWAYS = 0.98
+LABEL = "starter cell"
+# A named state is taken for the scan configuration if it looks down at least so much
+# (cosine of 60 degrees).
+LOOKS_DOWN = 0.5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,6 +47,10 @@ class NewCell:
     ----------
     path, srdf_path : Path
         The cell, and the SRDF beside it if links touch in every position.
+    packages : mapping
+        Packages that the cell names.
+    notes : tuple of str
+        What was left out, or put elsewhere than usual.
     problems : tuple of str
         Why the cell does not work yet; empty where it does.
     """
@@ -54,7 +59,10 @@ class NewCell:
     srdf_path: Path | None
     base: str
     tip: str
+    approach_axis: str
     joints: tuple[str, ...]
+    packages: Mapping[str, str]
+    notes: tuple[str, ...]
     problems: tuple[str, ...]
 
 
@@ -64,9 +72,15 @@ def new_cell(
     output: Path,
     base: str | None = None,
     tip: str | None = None,
+    packages: Mapping[str, str] | None = None,
+    xacro_args: Mapping[str, str] | None = None,
+    moveit_config: Path | None = None,
     overwrite: bool = False,
 ) -> NewCell:
     """Write a commented starter cell for a robot.
+
+    Nothing is written where the cell could not be loaded: what is wrong then is not in
+    the cell. One that loads but cannot work yet is written, to be mended.
 
     Parameters
     ----------
@@ -76,6 +90,12 @@ def new_cell(
         The cell file.
     base, tip : str, optional
         Links of the chain; guessed where omitted.
+    packages, xacro_args : mapping, optional
+        Package name to folder, argument of the xacro file to value; both are written
+        into the cell.
+    moveit_config : Path, optional
+        Folder of a MoveIt configuration: SRDF, joint limits, named states and bodies
+        of planning scenes are taken into the cell.
     overwrite : bool
         Replace ``output``.
 
@@ -84,135 +104,237 @@ def new_cell(
     CellError, SettingsError, OutputError
         The URDF cannot be used, a link does not exist, or nothing can be written.
     """
-    target = check_output(output, overwrite=overwrite, inputs=[urdf])
+    target = check_output(output, overwrite=overwrite)
     folder = target.parent
-    srdf_target = target.with_suffix(".srdf")
-    check_outputs([output, srdf_target], overwrite=True, inputs=[urdf])
-    reference = _reference(urdf, folder)
-    choices, robot = _first_choices(reference, folder, base, tip)
-    choices, srdf, problems = _tried(choices, robot, folder, srdf_target.name)
-    if srdf:
-        publish(srdf_target, [srdf.encode()], overwrite=overwrite)
+    source = read_source(
+        urdf,
+        folder,
+        packages=packages or {},
+        xacro_args=xacro_args or {},
+        moveit_config=moveit_config,
+    )
+    attempt = _Attempt(folder, source, _first_choices(source, base, tip))
+    problems = attempt.refine()
+    choices = attempt.choices
+    if attempt.srdf:
+        srdf_target = target.with_suffix(".srdf")
+        publish(srdf_target, [attempt.srdf.encode()], overwrite=overwrite)
+        choices = replace(choices, srdf=srdf_target.name)
     publish(output, [starter_text(choices).encode()], overwrite=overwrite)
     return NewCell(
         path=output,
-        srdf_path=output.with_suffix(".srdf") if srdf else None,
+        srdf_path=output.with_suffix(".srdf") if attempt.srdf else None,
         base=choices.base,
         tip=choices.tip,
+        approach_axis=choices.approach_axis,
         joints=tuple(joint.name for joint in choices.joints),
+        packages=choices.packages,
+        notes=(*source.notes, *attempt.notes),
         problems=problems,
     )
 
 
-def _reference(urdf: str, folder: Path) -> str:
-    """Write the reference to the URDF: relative if it lies beside the cell."""
-    if urdf.startswith(SCHEME):
-        return urdf
-    path = Path(urdf).absolute()
-    if path.is_relative_to(folder):
-        return path.relative_to(folder).as_posix()
-    return str(path)
-
-
 def _first_choices(
-    reference: str, folder: Path, base: str | None, tip: str | None
-) -> tuple[StarterChoices, UrdfDescription]:
-    """Choices that the URDF alone decides."""
-    resolver = Resolver(directory=folder)
-    try:
-        path = resolver.resolve(reference)
-    except NotFoundError as error:
-        raise SettingsError(str(error)) from None
-    robot = parse_urdf(robot_text(path, {}, resolver).text, path.name)
+    source: RobotSource, base: str | None, tip: str | None
+) -> StarterChoices:
+    """Choices that the files alone decide."""
+    robot = source.robot
     for link in (base, tip):
         if link is not None and link not in robot.links:
             hint = did_you_mean(link, robot.links)
-            raise SettingsError(f"{path.name}: no link {link!r}; {hint}")
+            raise SettingsError(f"{source.label}: no link {link!r}; {hint}")
     chosen_base = base or guess_base(robot)
-    chosen_tip = tip or guess_tip(robot, chosen_base)
-    joints = [robot.joints[n] for n in robot.chain(chosen_base, chosen_tip)]
-    if not joints:
+    group = () if source.moveit is None else planning_group(robot, source.moveit)
+    group = tuple(n for n in group if base is None or n in _below(robot, chosen_base))
+    chosen_tip = tip or guess_tip(robot, chosen_base, group)
+    chain = robot.chain(chosen_base, chosen_tip)
+    names = [n for n in chain if tip or not group or n in group]
+    if not names:
         raise SettingsError(
-            f"{path.name}: no joint moves between {chosen_base!r} and {chosen_tip!r}"
+            f"{source.label}: no joint moves between {chosen_base!r} and {chosen_tip!r}"
         )
-    locked = {
-        joint.name: user_value(joint, middle_position(joint))
-        for joint in robot.joints.values()
-        if joint.moves and joint not in joints
-    }
-    scan = {j.name: round(user_value(j, middle_position(j)), 4) for j in joints}
-    choices = StarterChoices(
-        name=cell_name(robot.name or path.stem),
-        urdf=reference,
+    joints = [robot.joints[name] for name in names]
+    return StarterChoices(
+        name=cell_name(robot.name or Path(source.label).stem),
+        urdf=source.urdf,
+        srdf=source.srdf,
+        joint_limits=source.joint_limits,
+        packages=source.packages,
+        xacro_args=source.xacro_args,
         base=chosen_base,
         root=robot.root,
         tip=chosen_tip,
         joints=tuple(joints),
-        locked=locked,
-        scan_deg=scan,
+        approach_axis="+x" if chosen_tip.lower().endswith("ee_link") else "+z",
+        locked={
+            joint.name: round(user_value(joint, middle_position(joint)), 4)
+            for joint in robot.joints.values()
+            if joint.moves and joint not in joints
+        },
+        scan_deg={j.name: round(user_value(j, middle_position(j)), 4) for j in joints},
     )
-    return choices, robot
 
 
-def _tried(
-    choices: StarterChoices, robot: UrdfDescription, folder: Path, srdf_name: str
-) -> tuple[StarterChoices, str, tuple[str, ...]]:
-    """Refine the choices by moving the arm; problems where that cannot be done."""
-    scan, srdf = None, ""
-    try:
-        arm = RobotModel.from_cell(_loaded(choices, folder, ""))
-        Q, kinematics = _samples(arm), Kinematics(arm)
-        points = kinematics.forward_many(Q)[:, :3, 3]
-        reach = float(np.quantile(np.linalg.norm(points[:, :2], axis=1), 0.99))
-        choices = dataclasses.replace(choices, reach_m=max(reach, 0.05))
-        scene = Scene.build(_loaded(choices, folder, ""))
-        pairs = _always_touching(scene, Q[:300])
-        if pairs:
-            srdf = _srdf_text(robot.name, pairs)
-            scene = Scene.build(_loaded(choices, folder, srdf))
-            choices = dataclasses.replace(choices, srdf=srdf_name)
-        scan = _scan_configuration(scene, Q, choices.tip)
-    except ReachmapError as error:
-        return choices, srdf, error.lines
-    if scan is None:
-        return choices, srdf, ("no free scan configuration was found",)
-    choices = dataclasses.replace(choices, scan_deg=_as_user(choices, scan))
-    return choices, srdf, ()
+class _Attempt:
+    """Choices that get better as the arm is moved about.
+
+    Parameters
+    ----------
+    folder : Path
+        Where the cell will be.
+    source : RobotSource
+    choices : StarterChoices
+    """
+
+    def __init__(
+        self, folder: Path, source: RobotSource, choices: StarterChoices
+    ) -> None:
+        self._folder, self._source = folder, source
+        self.choices = choices
+        self.srdf = ""
+        self.notes: list[str] = []
+
+    def refine(self) -> tuple[str, ...]:
+        """Move the arm; say why the cell cannot work yet, if it cannot.
+
+        Raises
+        ------
+        CellError
+            The cell cannot even be loaded.
+        """
+        loaded = self._loaded()
+        try:
+            arm = RobotModel.from_cell(loaded)
+            Q = trial.as_written(arm, trial.random_configurations(arm))
+            self._measure(arm, Q)
+            scene = self._without_touching(Scene.build(self._loaded()), Q[:300])
+            scene = self._with_bin(scene)
+            return self._with_scan_configuration(scene, Q)
+        except CellError:
+            raise
+        except ReachmapError as error:
+            return error.lines
+
+    def _loaded(self) -> LoadedCell:
+        """The cell as it would be read from the disk."""
+        try:
+            loaded = cell_from_text(
+                starter_text(self.choices), label=LABEL, directory=self._folder
+            )
+        except CellError as error:
+            plain = [re.sub(rf"^{LABEL}:\d+:\d+: ", "", line) for line in error.lines]
+            raise CellError(f"{self._source.label}: {line}" for line in plain) from None
+        # An SRDF of our own is not on the disk yet.
+        return replace(loaded, srdf=self.srdf) if self.srdf else loaded
+
+    def _measure(self, arm: RobotModel, Q: FloatArray) -> None:
+        kinematics = Kinematics(arm)
+        reach = trial.reach_of(kinematics, Q)
+        axis = trial.approach_axis(kinematics, Q[0], reach)
+        self.choices = replace(
+            self.choices,
+            reach_m=reach,
+            approach_axis=axis or self.choices.approach_axis,
+            bodies=tuple(_body_lines(self._source, arm)),
+        )
+
+    def _without_touching(self, scene: Scene, Q: FloatArray) -> Scene:
+        """Disable pairs of links that touch in every position, in an SRDF."""
+        pairs = trial.always_touching(scene, Q)
+        if not pairs:
+            return scene
+        if self.choices.srdf:
+            self.notes += [
+                f"{a} and {b} touch in every position, which the SRDF does not allow"
+                for a, b in pairs
+            ]
+            return scene
+        self.srdf = _srdf_text(self._source.robot.name, pairs)
+        return Scene.build(self._loaded())
+
+    def _with_bin(self, scene: Scene) -> Scene:
+        """Put the bin where it is clear of what stands still."""
+        place = trial.bin_place(scene, self.choices.reach_m)
+        if place is None:
+            raise SceneError("bin.pose: the bin fits nowhere near the arm")
+        self.choices = replace(
+            self.choices, bin_xyz_m=place.xyz_m, bin_yaw_deg=place.yaw_deg
+        )
+        if not place.avoided:
+            return scene
+        where = ", ".join(f"{value:g}" for value in place.xyz_m)
+        self.notes.append(
+            f"the bin stands at ({where}): in front of the base it would meet "
+            f"{place.avoided}"
+        )
+        return Scene.build(self._loaded())
+
+    def _with_scan_configuration(self, scene: Scene, Q: FloatArray) -> tuple[str, ...]:
+        axis, joints = self.choices.approach_axis, self.choices.joints
+        states = self._states()
+        if states:
+            rows = [[v[j.name] for j in joints] for v in states.values()]
+            seen = trial.best_view(scene, np.array(rows), axis)
+            if seen is not None and seen[1] >= LOOKS_DOWN:
+                names = list(states)
+                best = names.pop(seen[0])
+                self.choices = replace(self.choices, states=(best, *names))
+                return ()
+            self.notes.append(
+                f"no named state is free and looks down ({', '.join(states)}); "
+                "the scan configuration was searched for"
+            )
+        found = trial.best_view(scene, Q, axis)
+        if found is None:
+            return ("no free scan configuration was found",)
+        values = {
+            joint.name: round(user_value(joint, float(value)), 4)
+            for joint, value in zip(joints, Q[found[0]], strict=True)
+        }
+        self.choices = replace(self.choices, scan_deg=values)
+        return ()
+
+    def _states(self) -> dict[str, dict[str, float]]:
+        """Named states that say where every joint is."""
+        moveit = self._source.moveit
+        return {
+            name: values
+            for name, values in ({} if moveit is None else moveit.states).items()
+            if all(joint.name in values for joint in self.choices.joints)
+        }
 
 
-def _loaded(choices: StarterChoices, folder: Path, srdf: str) -> LoadedCell:
-    text = starter_text(dataclasses.replace(choices, srdf=""))
-    loaded = cell_from_text(text, label="starter cell", directory=folder)
-    # The SRDF is not on disk yet.
-    return dataclasses.replace(loaded, srdf=srdf)
+def _below(robot: UrdfDescription, base: str) -> set[str]:
+    """Joints that move something against the base."""
+    return {name for link in robot.links for name in robot.chain(base, link)}
 
 
-def _samples(arm: RobotModel) -> FloatArray:
-    rng = np.random.default_rng(0)
-    # Beyond half a turn an arm only winds itself up.
-    half_turn = np.where(arm.is_revolute, np.pi, np.inf)
-    low, high = (
-        np.maximum(arm.lower_rad, -half_turn),
-        np.minimum(arm.upper_rad, half_turn),
-    )
-    if (low > high).any():
-        low, high = arm.lower_rad, arm.upper_rad
-    return np.asarray(rng.uniform(low, high, (SAMPLES, arm.dof)))
-
-
-def _always_touching(scene: Scene, Q: FloatArray) -> list[tuple[str, str]]:
-    """Pairs of links that touch in practically every configuration."""
-    if scene.checker.free_mask(Q).mean() > 1.0 - ALWAYS:
-        return []
-    Q = Q[:MANY]  # finding every pair takes long
-    counts = Counter(k for q in Q for k in scene.checker.touching_pairs(q))
-    pairs = []
-    for index, count in sorted(counts.items()):
-        first, second = scene.checker.body_pairs[index].split(" | ")
-        bin_walls = [name for name in (first, second) if name.startswith("bin ")]
-        if count >= ALWAYS * len(Q) and not bin_walls:
-            pairs.append((first, second))
-    return pairs
+def _body_lines(source: RobotSource, arm: RobotModel) -> list[str]:
+    """Bodies of planning scenes as lines of YAML, in robot_base."""
+    lines = []
+    names: set[str] = {*source.robot.links, "bin"}
+    for body in source.bodies:
+        known = body.frame in source.robot.links and body.frame != source.robot.root
+        T = body.T_frame_body if known else arm.T_base_root @ body.T_frame_body
+        name = re.sub(r"[^A-Za-z0-9_.-]+", "_", body.name).strip("_.-") or "object"
+        while name in names:
+            name += "_"
+        names.add(name)
+        pose = {
+            "xyz": [round(float(v), 6) + 0.0 for v in T[:3, 3]],
+            "quaternion_wxyz": [
+                round(float(v), 9) + 0.0
+                for v in quaternion_wxyz_from_rotation(T[:3, :3])
+            ],
+        }
+        entry = {
+            "name": name,
+            "attach_to": body.frame if known else "robot_base",
+            "shape": body.shape,
+            "pose": pose,
+        }
+        lines.append(f"  - {scalar(entry)}")
+    return lines
 
 
 def _srdf_text(name: str, pairs: list[tuple[str, str]]) -> str:
@@ -223,31 +345,3 @@ def _srdf_text(name: str, pairs: list[tuple[str, str]]) -> str:
         for first, second in pairs
     ]
     return "\n".join([*lines, "</robot>", ""])
-
-
-def _scan_configuration(scene: Scene, Q: FloatArray, tip: str) -> FloatArray | None:
-    """Free configuration that looks down on the bin best; None if none is free."""
-    # As it will be written: degrees with one decimal, metres with four.
-    factor = np.where(scene.robot.is_revolute, np.radians(0.1), 1e-4)
-    Q = np.round(Q / factor) * factor
-    low, high = scene.robot.lower_rad, scene.robot.upper_rad
-    Q = Q[((low <= Q) & (high >= Q)).all(axis=1)]
-    Q = Q[scene.checker.free_mask(Q)]
-    if not len(Q):
-        return None
-    T = scene.kinematics.forward_many(Q)
-    column, sign = AXES[approach_axis(tip)]
-    reach = np.linalg.norm(T[:, :2, 3], axis=1).max()
-    over = T[:, :3, 3] - scene.T_base_bin[:3, 3]
-    off_centre = np.linalg.norm(over[:, :2], axis=1) / reach
-    height = np.abs(over[:, 2] / reach - 0.5)
-    downwards = -sign * T[:, 2, column]
-    effort = np.abs(Q).mean(axis=1) / np.pi
-    return np.asarray(Q[np.argmax(downwards - off_centre - height - effort)])
-
-
-def _as_user(choices: StarterChoices, q: FloatArray) -> dict[str, float]:
-    return {
-        joint.name: round(user_value(joint, float(value)), 4)
-        for joint, value in zip(choices.joints, q, strict=True)
-    }

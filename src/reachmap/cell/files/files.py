@@ -11,10 +11,10 @@ from reachmap._typing import FloatArray
 from reachmap.cell.files.joint_limits import MoveItLimits, parse_joint_limits
 from reachmap.cell.files.meshes import MeshError, mesh_size
 from reachmap.cell.files.resources import NotFoundError, Resolver
+from reachmap.cell.files.robot_text import robot_text
 from reachmap.cell.files.srdf import SrdfDescription, parse_srdf
-from reachmap.cell.files.urdf import MAX_URDF_BYTES, UrdfDescription, parse_urdf
-from reachmap.cell.files.xacro import Expansion, expand_xacro
-from reachmap.cell.files.xml_text import read_xml
+from reachmap.cell.files.urdf import UrdfDescription, parse_urdf
+from reachmap.cell.files.xacro import Expansion
 from reachmap.cell.text.data import at, entries, text_at
 from reachmap.cell.text.messages import did_you_mean
 from reachmap.cell.text.yaml_reader import (
@@ -119,16 +119,6 @@ def compare_hashes(
                 f"mesh {key!r} has changed since: {path} has sha256 {found[:12]}…, "
                 f"expected {digest[:12]}…",
             )
-
-
-def robot_text(
-    path: Path, arguments: Mapping[str, str], resolver: Resolver
-) -> Expansion:
-    """Text of a URDF or SRDF file, xacro expanded."""
-    if path.suffix == ".xacro":
-        return expand_xacro(path, arguments, resolver)
-    text = read_xml(path, limit=MAX_URDF_BYTES)
-    return Expansion(text=text, arguments=(), packages={}, warnings=())
 
 
 def body_key(name: str, reference: str) -> str:

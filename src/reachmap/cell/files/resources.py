@@ -120,6 +120,20 @@ class Resolver:
             found = package_nearby(name, _normal(self.urdf_folder))
         return found, tried
 
+    def found_by_environment(self, name: str) -> Path | None:
+        """Folder of a package that nothing but an environment variable leads to."""
+        found, _ = self.package_folders(name)
+        above = package_above(name, _normal(self.urdf_folder or self.directory))
+        variables = [
+            *_entries("REACHMAP_PACKAGE_PATH"),
+            *_entries("ROS_PACKAGE_PATH"),
+            *(prefix / "share" for prefix in _entries("AMENT_PREFIX_PATH")),
+        ]
+        named = [*_in_folders(name, variables)]
+        if found and found[0] in named and found[0] not in above:
+            return _normal(found[0])
+        return None
+
     def resolve(self, reference: str) -> Path:
         """Absolute path of a file named in the cell file; NotFoundError if none."""
         if reference.startswith(SCHEME):

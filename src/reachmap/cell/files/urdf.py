@@ -19,6 +19,14 @@ MAX_URDF_BYTES = 20_000_000
 MAX_LINKS = 2_000
 MOVING = ("revolute", "continuous", "prismatic")
 JOINT_TYPES = (*MOVING, "fixed", "floating", "planar")
+# Root elements of other formats that come as XML.
+OTHER_ROOTS = {
+    "mujoco": "this is MJCF (MuJoCo)",
+    "mujocoinclude": "this is MJCF (MuJoCo)",
+    "sdf": "this is SDF (Gazebo)",
+    "gazebo": "this is SDF (Gazebo)",
+    "COLLADA": "this is a mesh (COLLADA)",
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -108,8 +116,10 @@ def parse_urdf(text: str, label: str) -> UrdfDescription:
     """
     root = parse_xml(text, label)
     if root.tag != "robot":
+        hint = OTHER_ROOTS.get(root.tag.rpartition(":")[2])
+        what = f"; {hint}, which is not read: export a URDF instead" if hint else ""
         raise CellError(
-            f"{label}: expected the root element <robot> (got <{root.tag}>)"
+            f"{label}: expected the root element <robot> (got <{root.tag}>){what}"
         )
     faults: list[str] = []
     links = [element.get("name", "") for element in root.findall("link")]

@@ -1,0 +1,61 @@
+"""Text of a robot description: URDF or SRDF, xacro expanded; other formats refused."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from reachmap.cell.files.resources import Resolver
+from reachmap.cell.files.urdf import MAX_URDF_BYTES
+from reachmap.cell.files.xacro import Expansion, expand_xacro
+from reachmap.cell.files.xml_text import read_xml
+from reachmap.errors import CellError
+
+# Suffixes of files that people take for robot descriptions, and what they are.
+OTHER_FILES = {
+    ".usd": "USD",
+    ".usda": "USD",
+    ".usdc": "USD",
+    ".usdz": "USD",
+    ".sdf": "SDF",
+    ".world": "SDF",
+    ".mjcf": "MJCF",
+    ".mjb": "MJCF",
+    ".gltf": "glTF",
+    ".glb": "glTF",
+    ".step": "STEP",
+    ".stp": "STEP",
+    ".stl": "a mesh",
+    ".dae": "a mesh",
+    ".obj": "a mesh",
+    ".ply": "a mesh",
+    ".proto": "a Webots PROTO",
+    ".zip": "an archive",
+}
+
+
+def robot_text(
+    path: Path, arguments: Mapping[str, str], resolver: Resolver
+) -> Expansion:
+    """Text of a URDF or SRDF file, xacro expanded.
+
+    Raises
+    ------
+    CellError
+        The file is of another kind, cannot be read, or does not expand.
+    """
+    kind = OTHER_FILES.get(path.suffix.lower())
+    if kind is not None:
+        raise CellError(
+            f"{path}: {kind} is not read; export the robot as URDF from the tool that "
+            "made it, or take the maker's URDF or xacro"
+        )
+    if path.suffix == ".xacro":
+        return expand_xacro(path, arguments, resolver)
+    text = read_xml(path, limit=MAX_URDF_BYTES)
+    if "<xacro:" in text:
+        raise CellError(
+            f"{path}: has <xacro:…> elements, which a URDF cannot; name it "
+            f"{path.name}.xacro to have it expanded"
+        )
+    return Expansion(text=text, arguments=(), packages={}, warnings=())

@@ -1,0 +1,185 @@
+"""Moving an arm about to see what suits it: approach axis, bin, scan configuration."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from reachmap._typing import FloatArray
+from reachmap.core.collision.bin_fit import BinFit
+from reachmap.core.kinematics.kinematics import Kinematics
+from reachmap.core.robot.model import RobotModel
+from reachmap.core.scene import Scene
+from reachmap.geometry import AXES, yaw_transform
+
+SAMPLES = 2000
+MANY = 40
+ALWAYS = 0.98
+# A tip this close to the last axis (as a share of the reach) is turned, not swung.
+ON_AXIS = 0.03
+ALONG = 0.95  # cosine of about 18 degrees
+
+
+def random_configurations(arm: RobotModel) -> FloatArray:
+    """Configurations spread over the joint ranges, shape (SAMPLES, dof) [rad]."""
+    rng = np.random.default_rng(0)
+    # Beyond half a turn an arm only winds itself up.
+    half_turn = np.where(arm.is_revolute, np.pi, np.inf)
+    low, high = (
+        np.maximum(arm.lower_rad, -half_turn),
+        np.minimum(arm.upper_rad, half_turn),
+    )
+    if (low > high).any():
+        low, high = arm.lower_rad, arm.upper_rad
+    return np.asarray(rng.uniform(low, high, (SAMPLES, arm.dof)))
+
+
+def approach_axis(kinematics: Kinematics, q: FloatArray, reach_m: float) -> str | None:
+    """Axis of the TCP frame along which the tool most likely points into the object.
+
+    A last joint that turns the tool about itself shows it by its axis, pointing away
+    from the joint before; one that swings the tool, by where it holds it.
+
+    Parameters
+    ----------
+    kinematics : Kinematics
+    q : array, shape (dof,)
+        Any configuration [rad].
+    reach_m : float
+
+    Returns
+    -------
+    str or None
+        ``+x`` … ``-z``; None where no axis of the frame is the one.
+    """
+    robot, last = kinematics.robot, len(q) - 1
+    T = kinematics.forward(q)
+
+    def moved(joint: int, by: float) -> FloatArray:
+        step = np.zeros(len(q))
+        step[joint] = by
+        return kinematics.forward(q + step)
+
+    if robot.is_revolute[last]:
+        # Half a turn takes the tip to the other side of the axis.
+        swung = (T[:3, 3] - moved(last, np.pi)[:3, 3]) / 2.0
+        if np.linalg.norm(swung) > max(ON_AXIS * reach_m, 0.01):
+            return _nearest_axis(T[:3, :3].T @ swung)
+        turn = moved(last, 0.1)[:3, :3] @ T[:3, :3].T
+        direction = np.array(
+            [turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]]
+        )
+    else:
+        direction = moved(last, 0.1)[:3, 3] - T[:3, 3]
+    direction /= np.linalg.norm(direction)
+    for joint in reversed(range(last)):
+        arm = (T[:3, 3] - moved(joint, np.pi)[:3, 3]) / 2.0
+        if robot.is_revolute[joint] and abs(arm @ direction) > 0.01 * reach_m:
+            return _nearest_axis(T[:3, :3].T @ (direction * np.sign(arm @ direction)))
+    # All axes are parallel, as in a SCARA, which picks from above.
+    return _nearest_axis(T[:3, :3].T @ (direction * (-np.sign(direction[2]) or 1.0)))
+
+
+def _nearest_axis(direction: FloatArray) -> str | None:
+    direction = direction / np.linalg.norm(direction)
+    column = int(np.argmax(np.abs(direction)))
+    if abs(direction[column]) < ALONG:
+        return None
+    return ("+" if direction[column] > 0 else "-") + "xyz"[column]
+
+
+def always_touching(scene: Scene, Q: FloatArray) -> list[tuple[str, str]]:
+    """Pairs of links that touch in practically every configuration."""
+    if scene.checker.free_mask(Q).mean() > 1.0 - ALWAYS:
+        return []
+    Q = Q[:MANY]  # finding every pair takes long
+    counts = Counter(k for q in Q for k in scene.checker.touching_pairs(q))
+    pairs = []
+    for index, count in sorted(counts.items()):
+        first, second = scene.checker.body_pairs[index].split(" | ")
+        bin_walls = [name for name in (first, second) if name.startswith("bin ")]
+        if count >= ALWAYS * len(Q) and not bin_walls:
+            pairs.append((first, second))
+    return pairs
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BinPlace:
+    """Where the bin can stand, and what stands in the usual place ("" if nothing)."""
+
+    xyz_m: tuple[float, float, float]
+    yaw_deg: float
+    avoided: str
+
+
+def bin_place(scene: Scene, reach_m: float) -> BinPlace | None:
+    """First place for the bin that is clear of what stands still.
+
+    In front at the base's height if it fits there; else nearer, beside the arm, behind
+    it, higher or lower. None where it fits nowhere.
+    """
+    fit = BinFit(scene.robot, scene.loaded, None)
+    avoided = ""
+    for x, y, z, yaw_deg in _places(reach_m):
+        contact = fit.contact(yaw_transform(x, y, z, np.radians(yaw_deg)))
+        if contact is None:
+            return BinPlace(xyz_m=(x, y, z), yaw_deg=yaw_deg, avoided=avoided)
+        avoided = avoided or contact.other
+    return None
+
+
+def _places(reach_m: float) -> Iterator[tuple[float, float, float, float]]:
+    for height in (0.0, 0.1, 0.2, 0.3, -0.2, -0.4, -0.6, 0.6, 1.0, 2.0):
+        for angle_deg in (0, 90, -90, 180):
+            for radius in (0.6, 0.75, 0.5):
+                r, angle = radius * reach_m, np.radians(angle_deg)
+                x, y = round(r * np.cos(angle), 3), round(r * np.sin(angle), 3)
+                yield x + 0.0, y + 0.0, round(height * reach_m, 3), 90.0 + angle_deg
+
+
+def best_view(scene: Scene, Q: FloatArray, axis: str) -> tuple[int, float] | None:
+    """Free configuration that looks down on the bin best.
+
+    Parameters
+    ----------
+    scene : Scene
+    Q : array, shape (n, dof)
+        Candidates [rad].
+    axis : str
+        Axis of the TCP that looks.
+
+    Returns
+    -------
+    (int, float) or None
+        Row, and how far down it looks (1: straight down); None if none is free.
+    """
+    low, high = scene.robot.lower_rad, scene.robot.upper_rad
+    rows = np.flatnonzero(((low <= Q) & (high >= Q)).all(axis=1))
+    rows = rows[scene.checker.free_mask(Q[rows])]
+    if not len(rows):
+        return None
+    T = scene.kinematics.forward_many(Q[rows])
+    column, sign = AXES[axis]
+    reach = np.linalg.norm(T[:, :2, 3], axis=1).max()
+    over = T[:, :3, 3] - scene.T_base_bin[:3, 3]
+    off_centre = np.linalg.norm(over[:, :2], axis=1) / reach
+    height = np.abs(over[:, 2] / reach - 0.5)
+    downwards = -sign * T[:, 2, column]
+    effort = np.abs(Q[rows]).mean(axis=1) / np.pi
+    best = int(np.argmax(downwards - off_centre - height - effort))
+    return int(rows[best]), float(downwards[best])
+
+
+def reach_of(kinematics: Kinematics, Q: FloatArray) -> float:
+    """How far the TCP gets from the base axis [m]."""
+    points = kinematics.forward_many(Q)[:, :3, 3]
+    return max(float(np.quantile(np.linalg.norm(points[:, :2], axis=1), 0.99)), 0.05)
+
+
+def as_written(robot: RobotModel, Q: FloatArray) -> FloatArray:
+    """Configurations as a cell file has them: 0.1 degrees, 0.1 mm."""
+    factor = np.where(robot.is_revolute, np.radians(0.1), 1e-4)
+    return np.asarray(np.round(Q / factor) * factor)
