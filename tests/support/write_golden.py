@@ -24,6 +24,11 @@ from tests.support.synthetic_maps import (
     synthetic_provenance,
     synthetic_workspace_map,
 )
+from tests.support.synthetic_parts import (
+    bin_with_parts,
+    placement_with_parts,
+    workspace_with_parts,
+)
 
 GOLDEN = Path(__file__).parents[1] / "maps" / "format" / "golden"
 
@@ -35,10 +40,11 @@ def main() -> None:
     )
     fractions = np.array([[[0.0, 0.5], [1.0, 0.25], [0.75, 0.0]]])
     workspace = synthetic_workspace_map(fractions, shared_row=1)
+    bin_map = synthetic_bin_map(0.5, shape=(1, 2, 3, 2, 2))
     records: dict[str, tuple[Any, Any]] = {
-        "workspace": (write_workspace_map, workspace),
-        "bin": (write_bin_map, synthetic_bin_map(0.5, shape=(1, 2, 3, 2, 2))),
-        "placement": (write_placement, synthetic_placement()),
+        "workspace": (write_workspace_map, workspace_with_parts(workspace)),
+        "bin": (write_bin_map, bin_with_parts(bin_map)),
+        "placement": (write_placement, placement_with_parts(synthetic_placement())),
     }
     for name, (write, record) in records.items():
         object.__setattr__(record, "provenance", provenance)

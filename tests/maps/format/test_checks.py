@@ -296,7 +296,7 @@ def test_path_lengths_agree_with_a_loop() -> None:
         ({"reason": ("why", "", "", "why")}, "reason must be given exactly"),
         ({"chosen": 1}, "bin_pose must be the pose of the chosen"),
         ({"margin": {"+x": -0.1}}, "shift_margin goes below 0"),
-        ({"joint_names": ("a",)}, "joint and its list joint_names differ"),
+        ({"joint_names": ("a",)}, "dimensions say (1,)"),
     ],
 )
 def test_rules_of_a_placement(changes: dict[str, Any], message: str) -> None:

@@ -120,6 +120,10 @@ def _add_leaf(digest: Any, path: str, leaf: Leaf) -> None:
         digest.update(f"text {json.dumps(path)} {len(data)}\n".encode())
         digest.update(data)
         return
+    if leaf.value.dtype.kind == "U":
+        data = json.dumps([path, list(leaf.dims), leaf.value.tolist()]).encode()
+        digest.update(b"texts " + data + b"\n")
+        return
     array = canonical_array(leaf.value)
     header = json.dumps([path, list(leaf.dims), array.dtype.str, list(array.shape)])
     digest.update(f"array {header}\n".encode())

@@ -28,6 +28,8 @@ _INTERNAL = {
     "_Netcdf4Dimid", "_Netcdf4Coordinates", "_NCProperties",
 }  # fmt: skip
 _TEXT = h5py.string_dtype()
+# What the netCDF library calls the scale of a dimension that is no variable.
+_NO_VARIABLE = "This is a netCDF dimension but not a netCDF variable."
 
 
 class StructureError(Exception):
@@ -51,7 +53,8 @@ def image_from_tree(tree: Tree) -> bytes:
             dataset = _write_value(file, path, leaf)
             _write_attributes(dataset, leaf.attributes)
             if leaf.dims == (path.rpartition("/")[2],):
-                dataset.make_scale(leaf.dims[0])
+                size = f"{_NO_VARIABLE}{len(dataset):10d}"
+                dataset.make_scale(size if leaf.is_hidden else leaf.dims[0])
         _attach_scales(file, tree)
         file.flush()
         return bytes(file.id.get_file_image())
@@ -62,6 +65,10 @@ def _write_value(file: Any, path: str, leaf: Leaf) -> Any:
     if isinstance(leaf.value, str):
         return file.create_dataset(path, data=leaf.value, dtype=_TEXT, **fixed)
     array = leaf.value
+    if array.dtype.kind == "U":
+        return file.create_dataset(
+            path, data=array.astype(object), dtype=_TEXT, **fixed
+        )
     # A chunk must not be larger than the data, so an empty axis is made extensible.
     growing = tuple(None if n == 0 else n for n in array.shape)
     return file.create_dataset(
@@ -216,16 +223,27 @@ def _checked_bytes(path: str, dataset: Any) -> int:
 def _read_leaf(path: str, dataset: Any) -> Leaf:
     name = path.rpartition("/")[2]
     attributes = _read_attributes(dataset)
-    if dataset.dtype.kind == "O":
-        if h5py.check_string_dtype(dataset.dtype) is None or dataset.shape != ():
-            raise StructureError(f"{path} is not a single text")
+    is_text = dataset.dtype.kind == "O"
+    if is_text and (h5py.check_string_dtype(dataset.dtype) is None or dataset.ndim > 1):
+        raise StructureError(f"{path} is neither a text nor a list of texts")
+    if is_text and dataset.ndim == 0:
         return Leaf(value=dataset.asstr()[()], attributes=attributes)
+    if is_text:
+        value = np.array(dataset.asstr()[()].tolist(), dtype=str)
+    else:
+        # 0-dimensional arrays come back as scalars; ask for an array either way.
+        value = np.asarray(dataset[()])
     if dataset.is_scale and dataset.ndim == 1:
         dims: tuple[str, ...] = (name,)
     else:
         dims = tuple(_dimension_name(dimension) for dimension in dataset.dims)
-    # 0-dimensional arrays come back as scalars; ask for an array either way.
-    return Leaf(value=np.asarray(dataset[()]), dims=dims, attributes=attributes)
+    scale_name = dataset.attrs.get("NAME", b"")
+    return Leaf(
+        value=value,
+        dims=dims,
+        attributes=attributes,
+        is_hidden=bytes(scale_name).startswith(_NO_VARIABLE.encode()),
+    )
 
 
 def _dimension_name(dimension: Any) -> str:

@@ -29,11 +29,14 @@ class Leaf:
         One name per dimension; a coordinate array is named like its dimension.
     attributes : mapping
         Strings, numbers, or lists of either.
+    is_hidden : bool
+        Whether netCDF readers take the coordinate for a mere length and pass it over.
     """
 
     value: Array | str
     dims: tuple[str, ...] = ()
     attributes: Mapping[str, Any] = field(default_factory=dict)
+    is_hidden: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -108,6 +108,8 @@ def assemble(
     _add_groups(tree, variables, labels)
     for variable in variables:
         value = arrays.get(variable.path)
+        if value is None and variable.dtype == "U":
+            value = np.array(labels[variable.labels], str)
         if value is None and variable.dims == (variable.name,):
             value = np.arange(sizes.get((variable.group, variable.name), 0))
         if value is None:
@@ -116,6 +118,7 @@ def assemble(
             value=_fitted(variable, value),
             dims=variable.dims,
             attributes=_variable_attributes(variable, labels, numbers or {}),
+            is_hidden=variable.is_hidden,
         )
         tree.leaves[variable.path] = leaf
     tree.leaves.update({k: Leaf(value=text) for k, text in (texts or {}).items()})
@@ -205,7 +208,7 @@ def _add_groups(
             tree.groups[variable.group] = {
                 "NX_class": "NXdata",
                 "signal": "status",
-                "axes": ("z", "y", "x", "orientation"),
+                "axes": ("cube_z", "cube_y", "cube_x", "orientation"),
             }
         elif variable.group:
             tree.groups.setdefault(variable.group, {"NX_class": "NXcollection"})

@@ -74,7 +74,9 @@ def _check_leaf(variable: Variable, leaf: Leaf) -> list[str]:
     if isinstance(value, str):
         return [f"{path} is a text"]
     problems = []
-    if value.dtype.newbyteorder("=") != np.dtype(variable.dtype):
+    if variable.dtype != value.dtype.kind and (
+        value.dtype.newbyteorder("=") != np.dtype(variable.dtype)
+    ):
         problems.append(f"{path} has the type {value.dtype}, not {variable.dtype}")
     if leaf.dims != variable.dims:
         problems.append(
@@ -92,6 +94,8 @@ def _check_leaf(variable: Variable, leaf: Leaf) -> list[str]:
             problems.append(f"{path} lacks its list {variable.labels}")
         elif variable.dims == (variable.name,) and len(labels) != value.size:
             problems.append(f"{path} and its list {variable.labels} differ in length")
+        elif value.dtype.kind == "U" and value.tolist() != list(labels):
+            problems.append(f"{path} must be its list {variable.labels}")
     if variable.number:
         number = leaf.attributes.get(variable.number)
         if not isinstance(number, float) or not 0.0 < number < np.inf:

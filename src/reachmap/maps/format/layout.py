@@ -27,7 +27,7 @@ class Variable:
         Where it is; ``{cube}`` stands for the name of each cube.
     dims : tuple of str
     dtype : str
-        As NumPy names it, little-endian: "f8", "u1", "i4".
+        As NumPy names it, little-endian: "f8", "u1", "i4"; "U" for texts.
     units : str
         "m", "rad", "s", "percent", or "1" for pure numbers.
     meaning : str
@@ -47,6 +47,8 @@ class Variable:
         Whether the numbers are :class:`~reachmap.maps.records.Status` codes.
     is_flag : bool
         Whether the numbers are 0 for no and 1 for yes.
+    is_hidden : bool
+        Whether netCDF readers take the coordinate for a mere length.
     number : str
         Name of an attribute that holds a number ("seconds_per_check"), or "".
     """
@@ -65,6 +67,7 @@ class Variable:
     is_status: bool = False
     is_flag: bool = False
     number: str = ""
+    is_hidden: bool = False
 
     @property
     def name(self) -> str:
@@ -295,8 +298,16 @@ def goal(prefix: str, dims: tuple[str, ...], which: str) -> Variable:
     )
 
 
+JOINT = Variable(
+    path="joint",
+    dims=("joint",),
+    dtype="U",
+    units="1",
+    meaning="Names of the joints.",
+    labels="joint_names",
+)
 COMMON_SCALES = (
-    index("joint", "Joints, in the order of joint_names.", labels="joint_names"),
+    JOINT,
     index("quat", "Parts of a quaternion: w, x, y, z."),
 )
 SCAN = Variable(

@@ -18,7 +18,7 @@ from reachmap.maps.format.assembly import (
     stamp_of,
 )
 from reachmap.maps.format.checks import check_pose, check_world, require
-from reachmap.maps.format.layout import PERCENT, SCAN, Layout, Variable, index
+from reachmap.maps.format.layout import JOINT, PERCENT, SCAN, Layout, Variable, index
 from reachmap.maps.format.sections import PLACEMENT_SECTIONS
 from reachmap.maps.format.store import load, store
 from reachmap.maps.records import BinPlacement
@@ -81,7 +81,7 @@ PLACEMENT = Layout(
     },
     variables=(
         index("candidate", "Poses that were considered."),
-        index("joint", "Joints, in the order of joint_names.", labels="joint_names"),
+        JOINT,
         index("pose_row", "Rows of a homogeneous matrix."),
         index("pose_column", "Columns of a homogeneous matrix."),
         index("xyz", "Coordinates x, y, z."),

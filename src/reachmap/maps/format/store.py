@@ -31,6 +31,7 @@ from reachmap.maps.format.layout import (
     Layout,
     kind_of_format,
 )
+from reachmap.maps.format.upgrade import upgraded
 
 MAX_PROBLEMS = 8
 """Mistakes of one file that are listed before the rest is only counted."""
@@ -80,7 +81,10 @@ def load(path: Path, *layouts: Layout) -> tuple[Tree, Layout]:
         tree = tree_from_image(image)
     except StructureError as error:
         raise MapFileError(f"{path}: damaged, {error}; {_expected(layouts)}") from error
-    problems = check_hashes(tree)[:1] or check_tree(tree, found)
+    problems = check_hashes(tree)[:1]
+    if not problems:
+        tree = upgraded(tree)
+        problems = check_tree(tree, found)
     if problems:
         raise MapFileError(
             f"{path}: damaged {found.name}, {text}; `{found.command}` makes a new one"

@@ -75,6 +75,13 @@ def _check_cube(tree: Tree, prefix: str) -> list[str]:
         *check_outcome(tree, prefix),
         *check_quaternions(tree.array(f"{prefix}quaternion_wxyz"), prefix),
         *check_coordinates(tree, prefix, "zyx"),
+        *(
+            f"{prefix}cube_{axis} must be {prefix}{axis}"
+            for axis in "zyx"
+            if not np.array_equal(
+                tree.array(f"{prefix}cube_{axis}"), tree.array(f"{prefix}{axis}")
+            )
+        ),
         *require(
             np.isfinite(length) == found,
             f"{prefix}path_length must be finite exactly where a path was found",
@@ -115,8 +122,26 @@ def cubes_from_tree(tree: Tree) -> dict[str, CubeMap]:
 
 
 _LEVEL = ("z", "y", "x")
-_FRAME = ("z", "y", "x", "orientation")
+_FRAME = ("cube_z", "cube_y", "cube_x", "orientation")
 _CUBE = "cubes/{cube}/"
+
+
+def _cube_scales() -> tuple[Variable, ...]:
+    """Coordinates of a cube; x, y, z are their names in version 1.0.
+
+    In xarray's trees the dimensions of a group are those of the groups above it, so
+    that a cube's cannot be called like the root's.
+    """
+    words = {"z": "Levels", "y": "Rows", "x": "Columns"}
+    return tuple(
+        dataclasses.replace(
+            coordinate(f"{_CUBE}{prefix}{axis}", f"{text} of the cube.", "robot_base"),
+            is_hidden=not prefix,
+        )
+        for prefix in ("cube_", "")
+        for axis, text in words.items()
+    )
+
 
 WORKSPACE = Layout(
     kind="workspace_map",
@@ -160,9 +185,7 @@ WORKSPACE = Layout(
             **PERCENT,
         ),
         SCAN,
-        coordinate(f"{_CUBE}z", "Levels of the cube.", "robot_base"),
-        coordinate(f"{_CUBE}y", "Rows of the cube.", "robot_base"),
-        coordinate(f"{_CUBE}x", "Columns of the cube.", "robot_base"),
+        *_cube_scales(),
         index(f"{_CUBE}orientation", "Test frames at a point."),
         Variable(
             path=f"{_CUBE}quaternion_wxyz",
@@ -249,6 +272,8 @@ def tree_from_workspace_map(record: WorkspaceMap) -> Tree:
     for cube, content in record.cubes.items():
         for name in _CUBE_FIELDS:
             arrays[f"cubes/{cube}/{name}"] = getattr(content, name)
+        for axis in "zyx":
+            arrays[f"cubes/{cube}/cube_{axis}"] = getattr(content, axis)
     optional, lists, numbers = section_arrays(WORKSPACE, record)
     return assemble(
         WORKSPACE,
