@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from reachmap.cli.text.tables import fact_lines, table_lines
-from reachmap.maps.comparison.comparison import flat_json
+from reachmap.maps.bytes.to_json import flat_json
 from reachmap.maps.format.placement import is_turn
 from reachmap.maps.records import Status
 from reachmap.maps.summary.bin import MEASURES, BinSummary, Spread

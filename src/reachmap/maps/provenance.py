@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from reachmap.disk import recorded_name
 from reachmap.errors import MapFileError
-from reachmap.maps.bytes.tree import plain
+from reachmap.maps.bytes.to_json import plain
 from reachmap.maps.records import Provenance, RunInfo
 
 if TYPE_CHECKING:

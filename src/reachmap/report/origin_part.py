@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from typing import Any
 
+from reachmap.maps.bytes.to_json import flat_json
 from reachmap.maps.format.registry import Artefact, kind_of
 from reachmap.report.blocks import (
     Code,
@@ -18,6 +20,8 @@ from reachmap.report.blocks import (
 )
 from reachmap.report.folder import RunFolder
 from reachmap.report.numbers import number
+
+QUOTE = '"'
 
 
 def origin_section(run: RunFolder) -> Section:
@@ -51,7 +55,7 @@ def _facts(record: Artefact) -> Table | None:
             ("workers", run.workers if run.started else ""),
             ("wall time", _seconds(run.wall_s)),
             ("CPU time", _seconds(run.cpu_s)),
-            ("settings", ", ".join(flat_settings(kept.settings))),
+            ("settings", _settings(kept.settings)),
             ("packages", ", ".join(f"{k} {v}" for k, v in kept.packages.items())),
         ]
     )
@@ -73,22 +77,11 @@ def _command(line: str) -> str:
     return f"{program.rsplit('/', 1)[-1]} {rest}".strip()
 
 
-def flat_settings(value: Any, prefix: str = "") -> list[str]:
-    """Nested settings as ``key.key = value``; of a list, how long it is.
-
-    Examples
-    --------
-    >>> flat_settings({"planner": {"name": "RRT"}, "pairs": ["a | b", "c | d"]})
-    ['planner.name = RRT', 'pairs: 2']
-    """
-    if isinstance(value, Mapping):
-        return [
-            text
-            for key, item in value.items()
-            for text in flat_settings(item, f"{prefix}.{key}" if prefix else str(key))
-        ]
-    if isinstance(value, list | tuple):
-        return [f"{prefix}: {len(value)}"]
-    words = {True: "yes", False: "no", None: "none"}
-    said = words[value] if value is None or isinstance(value, bool) else value
-    return [f"{prefix} = {said}"]
+def _settings(settings: Mapping[str, Any]) -> str:
+    """Settings as ``key.key = value``; of a list, how many entries it has."""
+    said = []
+    for key, text in flat_json(settings):
+        value = json.loads(text)
+        many = isinstance(value, list)
+        said.append(f"{key}: {len(value)}" if many else f"{key} = {text.strip(QUOTE)}")
+    return ", ".join(said)

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from reachmap.errors import GateFailedError, SettingsError
-from reachmap.maps.bytes.tree import json_ready
+from reachmap.maps.bytes.to_json import json_ready
 from reachmap.maps.comparison.comparison import Comparison, SquareChange, compare_maps
 from reachmap.maps.comparison.pose_matching import TOLERANCE_DEG, TOLERANCE_M, Frame
 from reachmap.maps.format.registry import kind_of

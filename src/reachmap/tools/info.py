@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from reachmap.maps.bytes.tree import json_ready
+from reachmap.maps.bytes.to_json import json_ready
 from reachmap.maps.format.registry import Artefact, kind_of
 from reachmap.maps.records import BinMap, WorkspaceMap
 from reachmap.maps.summary.bin import BinSummary, summarise_bin

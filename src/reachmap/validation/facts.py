@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 from typing import Any
 
-import numpy as np
-
+from reachmap.maps.bytes.to_json import json_ready
 from reachmap.ranking.answers.ranked_list import status_name
 from reachmap.ranking.lookup.table import TERMS
 from reachmap.scans.measured import MEASURED
@@ -48,7 +46,7 @@ def facts_of(
             for one in validation.lists
             for row in range(len(one.ids))
         ]
-    return dict(_json_ready(facts))
+    return dict(json_ready(facts))
 
 
 def _list_facts(one: ListSummary) -> dict[str, Any]:
@@ -113,13 +111,3 @@ def _grasp_facts(
         "hit_time_limit": bool(results.hit_time_limit[row].any()),
         "blocking_pair": body_pairs[pair] if pair >= 0 else None,
     }
-
-
-def _json_ready(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _json_ready(item) for key, item in value.items()}
-    if isinstance(value, np.ndarray | np.generic):
-        value = value.tolist()
-    if isinstance(value, list | tuple):
-        return [_json_ready(item) for item in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value

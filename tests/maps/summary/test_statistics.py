@@ -1,5 +1,8 @@
 """Counts, intervals and tests against brute force and SciPy."""
 
+from fractions import Fraction
+from math import comb
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -29,19 +32,26 @@ def test_wilson_intervals_are_those_of_scipy(total: int, data: st.DataObject) ->
     assert high[0] == pytest.approx(known.high, abs=1e-12)
 
 
+def likelihood(hits_a: int, total_a: int, hits: int, total: int) -> Fraction:
+    """Hypergeometric probability of a table with given margins, exactly."""
+    ways = comb(total_a, hits_a) * comb(total - total_a, hits - hits_a)
+    return Fraction(ways, comb(total, hits))
+
+
 @settings(max_examples=60, deadline=None)
 @given(st.tuples(*[st.integers(0, 30)] * 4))
-def test_fisher_is_that_of_scipy(counts: tuple[int, int, int, int]) -> None:
-    """Two-sided exact p-values, for tables of any margins."""
+def test_fisher_sums_tables_that_are_no_likelier(
+    counts: tuple[int, int, int, int],
+) -> None:
+    """Two-sided exact p-values by enumeration in fractions, for any margins."""
     hits_a, misses_a, hits_b, misses_b = counts
-    found = fisher_exact(
-        np.array([hits_a]),
-        np.array([hits_a + misses_a]),
-        np.array([hits_b]),
-        np.array([hits_b + misses_b]),
-    )
-    known = stats.fisher_exact([[hits_a, misses_a], [hits_b, misses_b]]).pvalue
-    assert found[0] == pytest.approx(known, rel=1e-8)
+    total_a, total_b, hits = hits_a + misses_a, hits_b + misses_b, hits_a + hits_b
+    found = fisher_exact(*(np.array([n]) for n in (hits_a, total_a, hits_b, total_b)))
+    possible = range(max(0, hits - total_b), min(hits, total_a) + 1)
+    shares = [likelihood(k, total_a, hits, total_a + total_b) for k in possible]
+    observed = likelihood(hits_a, total_a, hits, total_a + total_b)
+    known = sum(share for share in shares if share <= observed)
+    assert found[0] == pytest.approx(float(known), rel=1e-8)
 
 
 def test_fisher_takes_many_tables_at_once() -> None:
@@ -61,25 +71,27 @@ def test_fisher_takes_many_tables_at_once() -> None:
 @given(gained=st.integers(0, 400), lost=st.integers(0, 400))
 def test_mcnemar_is_the_binomial_test(gained: int, lost: int) -> None:
     """Under chance alone a changed frame is gained with probability one half."""
-    if gained + lost:
-        known = stats.binomtest(gained, gained + lost, 0.5).pvalue
-        assert mcnemar_exact(gained, lost) == pytest.approx(known, rel=1e-8)
-    else:
-        assert mcnemar_exact(0, 0) == 1.0
+    changed = gained + lost
+    tail = sum(comb(changed, k) for k in range(min(gained, lost) + 1))
+    known = min(Fraction(1), Fraction(2 * tail, 2**changed))
+    assert mcnemar_exact(gained, lost) == pytest.approx(float(known), rel=1e-8)
 
 
 @settings(max_examples=60, deadline=None)
-@given(st.lists(st.floats(0, 1), max_size=40))
-def test_benjamini_hochberg_is_that_of_scipy(values: list[float]) -> None:
-    """The squares that are named are those whose adjusted p-value is at most 5 %."""
-    p = np.array(values)
-    named = benjamini_hochberg(p)
-    if not values:
-        assert named.shape == (0,)
-        return
-    adjusted = stats.false_discovery_control(p)
-    sure = np.abs(adjusted - 0.05) > 1e-12
-    np.testing.assert_array_equal(named[sure], (adjusted <= 0.05)[sure])
+@given(st.lists(st.integers(0, 1000), max_size=40))
+def test_benjamini_hochberg_keeps_to_its_definition(thousandths: list[int]) -> None:
+    """Named are the k least, k the largest with p(k) <= 5 % k / n; ties together."""
+    p = sorted(Fraction(n, 1000) for n in thousandths)
+    least = [k for k, v in enumerate(p, 1) if v <= Fraction(5, 100) * k / len(p)]
+    # Where a value lies on the limit itself, rounding decides.
+    on_limit = any(v == Fraction(5, 100) * k / len(p) for k, v in enumerate(p, 1))
+    named = benjamini_hochberg(np.array([float(n) / 1000 for n in thousandths]))
+    if not on_limit:
+        assert named.sum() == (least[-1] if least else 0)
+        assert named.tolist() == [
+            Fraction(n, 1000) <= p[least[-1] - 1] if least else False
+            for n in thousandths
+        ]
 
 
 def test_saturation_counts_by_brute_force() -> None:

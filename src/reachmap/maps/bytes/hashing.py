@@ -15,7 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from reachmap.maps.bytes.tree import Array, Leaf, Tree, plain
+from reachmap.maps.bytes.to_json import plain
+from reachmap.maps.bytes.tree import Array, Leaf, Tree
 
 MEASURED_TIMES = ("planning_time", "planning_cpu_time", "simplification_time")
 """Variables that differ from run to run; outside ``content_sha256``."""

@@ -14,7 +14,8 @@ from typing import Any
 import h5py
 import numpy as np
 
-from reachmap.maps.bytes.tree import Array, Leaf, Tree, plain
+from reachmap.maps.bytes.to_json import plain
+from reachmap.maps.bytes.tree import Array, Leaf, Tree
 
 CHUNK_BYTES = 16 * 2**20
 MAX_OBJECTS = 10_000

@@ -6,13 +6,10 @@ on this form; :mod:`reachmap.maps.bytes.hdf5` turns it into bytes and back.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from enum import Enum
 from typing import Any
 
-import numpy as np
 import numpy.typing as npt
 
 Array = npt.NDArray[Any]
@@ -82,43 +79,3 @@ class Tree:
         for path, leaf in self.leaves.items():
             if not isinstance(leaf.value, str):
                 yield path, leaf, leaf.value
-
-
-def plain(value: Any) -> Any:
-    """Turn a value into what JSON knows: NumPy scalars, arrays, tuples become plain.
-
-    Raises
-    ------
-    TypeError
-        For anything else, so that nothing unforeseen slips into a checksum.
-    """
-    if value is None or isinstance(value, bool | int | float | str):
-        return value
-    if isinstance(value, np.generic | np.ndarray):
-        return plain(value.tolist())
-    if isinstance(value, Mapping):
-        return {str(key): plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [plain(item) for item in value]
-    raise TypeError(f"{type(value).__name__} has no plain form")
-
-
-def json_ready(value: Any) -> Any:
-    """Plain values; keys that are states are their names, NaN and infinity are null.
-
-    Examples
-    --------
-    >>> json_ready({"mean": float("nan"), "counts": (1, 2)})
-    {'mean': None, 'counts': [1, 2]}
-    """
-    if isinstance(value, Mapping):
-        return {
-            key.name.lower() if isinstance(key, Enum) else str(key): json_ready(item)
-            for key, item in value.items()
-        }
-    if isinstance(value, list | tuple):
-        return [json_ready(item) for item in value]
-    value = plain(value)
-    if isinstance(value, list):
-        return [json_ready(item) for item in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import json
 from collections import Counter
-from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from reachmap._typing import BoolArray, FloatArray, IntArray
 from reachmap.errors import SettingsError
+from reachmap.maps.bytes.to_json import flat_json
 from reachmap.maps.comparison.pose_matching import (
     TOLERANCE_DEG,
     TOLERANCE_M,
@@ -46,23 +45,6 @@ def cell_changes(
         for key in [*a, *(key for key in b if key not in a)]
         if a.get(key) != b.get(key)
     )
-
-
-def flat_json(value: Any, prefix: str = "") -> Iterator[tuple[str, str]]:
-    """Leaves of nested JSON as ``key.name.key`` and JSON text.
-
-    Elements of a list go by their ``name`` if they have one, else by ``[0]``, …
-    """
-    if isinstance(value, Mapping):
-        for key, item in value.items():
-            yield from flat_json(item, f"{prefix}.{key}" if prefix else str(key))
-    elif isinstance(value, list) and any(isinstance(i, dict | list) for i in value):
-        for index, item in enumerate(value):
-            name = item.get("name") if isinstance(item, Mapping) else None
-            place = f".{name}" if isinstance(name, str) else f"[{index}]"
-            yield from flat_json(item, f"{prefix}{place}")
-    else:
-        yield prefix, json.dumps(value)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -3,13 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.special import bdtr, gammaln
+from scipy import stats
 
 from reachmap._typing import BoolArray, FloatArray, IntArray
-
-# Outcomes as likely as the observed one count as at least as extreme, although the
-# last bits of their likelihoods differ.
-_TIE = 1e-7
 
 
 def mcnemar_exact(gained: int, lost: int) -> float:
@@ -24,9 +20,7 @@ def mcnemar_exact(gained: int, lost: int) -> float:
     (1.0, 0.0625)
     """
     changed = gained + lost
-    if changed == 0:
-        return 1.0
-    return float(min(1.0, 2.0 * bdtr(min(gained, lost), changed, 0.5)))
+    return float(stats.binomtest(gained, changed).pvalue) if changed else 1.0
 
 
 def fisher_exact(
@@ -44,24 +38,11 @@ def fisher_exact(
     array, shape (n,)
         1 where nothing was tried.
     """
-    tables = np.stack([hits_a, total_a, hits_b, total_b], axis=-1).astype(np.int64)
+    tables = np.stack([hits_a, total_a - hits_a, hits_b, total_b - hits_b], axis=-1)
+    # Squares of a map share few tables.
     different, place = np.unique(tables, axis=0, return_inverse=True)
-    values = np.array([_fisher(*(int(v) for v in row)) for row in different])
-    return np.asarray(values[place.ravel()]) if len(tables) else np.zeros(0)
-
-
-def _fisher(hits_a: int, total_a: int, hits_b: int, total_b: int) -> float:
-    """Sum of the hypergeometric probabilities up to that of the table."""
-    hits, total = hits_a + hits_b, total_a + total_b
-    possible = np.arange(max(0, hits - total_b), min(hits, total_a) + 1)
-    weight = _log_choose(total_a, possible) + _log_choose(total_b, hits - possible)
-    probability = np.exp(weight - _log_choose(total, np.array(hits)))
-    observed = probability[hits_a - possible[0]]
-    return float(min(1.0, probability[probability <= observed * (1.0 + _TIE)].sum()))
-
-
-def _log_choose(n: int, k: IntArray) -> FloatArray:
-    return np.asarray(gammaln(n + 1.0) - gammaln(k + 1.0) - gammaln(n - k + 1.0))
+    values = [stats.fisher_exact(row.reshape(2, 2)).pvalue for row in different]
+    return np.array(values, float)[place.ravel()]
 
 
 def benjamini_hochberg(p_values: FloatArray, rate: float = 0.05) -> BoolArray:
@@ -84,10 +65,6 @@ def benjamini_hochberg(p_values: FloatArray, rate: float = 0.05) -> BoolArray:
     >>> benjamini_hochberg(np.array([0.001, 0.04, 0.2, 0.02])).tolist()
     [True, False, False, True]
     """
-    count = len(p_values)
-    order = np.argsort(p_values, kind="stable")
-    below = p_values[order] <= rate * np.arange(1, count + 1) / max(count, 1)
-    last = int(np.flatnonzero(below)[-1]) + 1 if below.any() else 0
-    named = np.zeros(count, bool)
-    named[order[:last]] = True
-    return named
+    if not len(p_values):
+        return np.zeros(0, bool)
+    return np.asarray(stats.false_discovery_control(p_values) <= rate)
