@@ -8,7 +8,7 @@ import click
 
 from reachmap.cli import options
 
-PORT = 8080
+HOST, PORT = "127.0.0.1", 8080
 
 
 def _test_grasp(
@@ -49,7 +49,15 @@ def _test_grasp(
     type=click.IntRange(0, 65535),
     default=PORT,
     show_default=True,
-    help="Port of the live view on 127.0.0.1; 0 takes a free one.",
+    help="Port of the live view; 0 takes a free one.",
+)
+@click.option(
+    "--host",
+    default=HOST,
+    show_default=True,
+    metavar="ADDRESS",
+    help="Address the live view listens on. Others than this machine's own, such as "
+    "0.0.0.0 in a container, let in whoever has the token in the printed address.",
 )
 @click.option(
     "--open/--no-browser",
@@ -63,6 +71,7 @@ def command(
     page: Path | None,
     test_grasps: tuple[tuple[int, int, int, int], ...],
     port: int,
+    host: str,
     open_browser: bool,
     overwrite: bool,
 ) -> None:
@@ -73,7 +82,8 @@ def command(
     of their reachability. A slider chooses the level, a filter the state of the test
     frames. A click on a point puts the arm there; where it cannot be, the bodies in the
     way are red. Paths of a bin map are played in the time the arm takes for them. The
-    view is served on this machine alone until Ctrl-C. Needs the extra [view].
+    view is served on this machine alone until Ctrl-C, to the page it serves and no
+    other. Needs the extra [view].
 
     Example: reachmap view bin.h5 --html bin-3d.html
     """
@@ -84,7 +94,7 @@ def command(
         page=page,
         test_grasps=test_grasps,
         overwrite=overwrite,
-        options=ViewOptions(port=port, open_browser=open_browser),
+        options=ViewOptions(host=host, port=port, open_browser=open_browser),
         on_ready=lambda address: click.echo(f"{address}  (Ctrl-C ends)"),
     )
     if written is not None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import time
 import zipfile
 
 import numpy as np
@@ -174,6 +175,39 @@ def test_archives_that_expand_are_refused(tmp_path):
     path.write_bytes(b"PK\x03\x04 no archive")
     with pytest.raises(GraspListError, match=r"not a readable .npz"):
         read_grasps(path, frame="bin")
+
+
+@pytest.mark.parametrize("method", ["DEFLATED", "BZIP2", "LZMA"])
+def test_archives_with_a_flipped_bit_are_refused(tmp_path, method):
+    """Whatever the decompressor calls it, and wherever the bit is."""
+    path = tmp_path / "g.npz"
+    with zipfile.ZipFile(path, "w", getattr(zipfile, f"ZIP_{method}")) as archive:
+        stream = io.BytesIO()
+        np.save(stream, graspnet_rows(40))
+        archive.writestr("rows.npy", stream.getvalue())
+    whole = path.read_bytes()
+    messages = []
+    for at in np.linspace(30, len(whole) - 60, 60).astype(int):
+        damaged = bytearray(whole)
+        damaged[at] ^= 1 << (at % 8)
+        path.write_bytes(damaged)
+        try:
+            read_grasps(path, frame="bin")
+        except GraspListError as error:
+            messages.append(str(error))
+    assert len(messages) > 50
+    assert all("g.npz" in message for message in messages)
+
+
+@pytest.mark.parametrize("nested", ["[" * 10**5, "- " * 10**5, "{a: " * 10**5])
+def test_deep_yaml_is_refused_at_once(tmp_path, nested):
+    """The reader would take minutes; its depth is looked at as it goes."""
+    path = tmp_path / "g.yaml"
+    path.write_text(ISAAC + "x: \n  " + nested)
+    begin = time.process_time()
+    with pytest.raises(GraspListError, match="nested more than 16 levels deep"):
+        read_grasps(path, frame="bin")
+    assert time.process_time() - begin < 5.0
 
 
 def test_more_rows_than_the_limit(tmp_path):

@@ -70,10 +70,13 @@ class Page:
             self.evaluate("1")
             time.sleep(0.1)
 
-    def evaluate(self, expression: str) -> Any:
-        """Value of a JavaScript expression."""
+    def evaluate(self, expression: str, *, promised: bool = False) -> Any:
+        """Value of a JavaScript expression, or of what it promises."""
         answer = self.call(
-            "Runtime.evaluate", expression=expression, returnByValue=True
+            "Runtime.evaluate",
+            expression=expression,
+            returnByValue=True,
+            awaitPromise=promised,
         )
         return answer["result"].get("value")
 

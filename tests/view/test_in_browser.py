@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import functools
 import threading
 from collections.abc import Iterator
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +14,7 @@ import pytest
 
 from reachmap.maps import write_bin_map, write_workspace_map
 from reachmap.tools.view import ViewOptions, view
+from reachmap.view.engine import start_server, stop_server
 from tests.support.chromium import Page, chromium, find_chromium
 from tests.support.toy_artefacts import toy_bin_map, toy_workspace
 
@@ -143,3 +146,65 @@ def green_place(page: Page) -> tuple[float, float] | None:
         return None
     y, x = solid[len(solid) // 2] + 2
     return float(x), float(y)
+
+
+TRY = """new Promise(done => {
+  const socket = new WebSocket("ws://127.0.0.1:%d/", ["viser-v1.1.1"]);
+  socket.onopen = () => done("opened");
+  socket.onerror = () => done("refused");
+})"""
+
+
+def test_a_foreign_page_gets_no_socket(browser: Page, tmp_path: Path) -> None:
+    """The browser's own word on where a page comes from decides, not the page's."""
+    (tmp_path / "index.html").write_text("<title>elsewhere</title>")
+    handler = functools.partial(SimpleHTTPRequestHandler, directory=str(tmp_path))
+    foreign = ThreadingHTTPServer(("127.0.0.1", 0), handler)
+    threading.Thread(target=foreign.serve_forever).start()
+    server = start_server(0)
+    port = server.get_port()
+    try:
+        for address, expected in (
+            (f"http://127.0.0.1:{port}/", "opened"),
+            (f"http://127.0.0.1:{foreign.server_port}/", "refused"),
+            (f"http://localhost:{foreign.server_port}/", "refused"),
+            (f"file://{tmp_path / 'index.html'}", "refused"),
+        ):
+            browser.open(address, 1.0)
+            assert browser.evaluate(TRY % port, promised=True) == expected, address
+    finally:
+        stop_server(server)
+        foreign.shutdown()
+        foreign.server_close()
+
+
+def test_a_shared_view_is_drawn_with_its_token(browser: Page, tmp_path: Path) -> None:
+    """The page hands the token on to its socket; without it there is no page."""
+    write_workspace_map(tmp_path / "workspace.h5", toy_workspace())
+    ready, done = threading.Event(), threading.Event()
+    told: list[str] = []
+
+    def on_ready(address: str) -> None:
+        told.append(address)
+        ready.set()
+
+    thread = threading.Thread(
+        target=view,
+        args=(tmp_path / "workspace.h5",),
+        kwargs={
+            "options": ViewOptions(host="0.0.0.0", port=0),
+            "on_ready": on_ready,
+            "wait": done.wait,
+        },
+    )
+    thread.start()
+    try:
+        assert ready.wait(30)
+        bare = told[0].partition("?")[0]
+        browser.open(bare, 1.0)
+        assert "with its token" in browser.evaluate("document.body.innerText")
+        browser.open(told[0], 3.0)
+        assert until(browser, lambda: green_place(browser) is not None)
+    finally:
+        done.set()
+        thread.join()

@@ -27,6 +27,8 @@ PACKAGES = (
 )  # fmt: skip
 """Distributions whose versions are recorded."""
 
+MAX_DEPTH = 32
+
 
 def package_versions(names: Sequence[str] = PACKAGES) -> dict[str, str]:
     """Versions of the distributions that are installed, and of Python."""
@@ -136,7 +138,7 @@ def provenance_from_texts(texts: Mapping[str, str], where: str) -> Provenance:
     return Provenance(
         cell_yaml=texts.get("cell_yaml", ""),
         cell_resolved_json=texts.get("cell_resolved_json", ""),
-        overrides=tuple(_json(texts, "overrides_json", where, list)),
+        overrides=_texts(_json(texts, "overrides_json", where, list), where),
         urdf=texts.get("urdf", ""),
         srdf=texts.get("srdf", ""),
         files_sha256=_json(texts, "files_sha256_json", where, dict),
@@ -175,6 +177,12 @@ def run_from_texts(texts: Mapping[str, str], where: str) -> RunInfo:
     )
 
 
+def _texts(values: list[Any], where: str) -> tuple[str, ...]:
+    if not all(isinstance(value, str) for value in values):
+        raise MapFileError(f"{where}: overrides_json is not a list of texts")
+    return tuple(values)
+
+
 def _json_text(value: Any) -> str:
     """Write JSON that keeps the order of keys, as phases of a run have one."""
     return json.dumps(plain(value), ensure_ascii=False)
@@ -186,6 +194,15 @@ def _json(texts: Mapping[str, str], name: str, where: str, kind: type) -> Any:
         value = json.loads(text) if text else kind()
     except (ValueError, RecursionError) as error:
         raise MapFileError(f"{where}: {name} is not JSON") from error
-    if not isinstance(value, kind):
-        raise MapFileError(f"{where}: {name} is not a JSON {kind.__name__}")
+    if not isinstance(value, kind) or not _is_shallow(value):
+        raise MapFileError(f"{where}: {name} is not a JSON {kind.__name__} as expected")
     return value
+
+
+def _is_shallow(value: Any, levels: int = MAX_DEPTH) -> bool:
+    """Whether a JSON value is nested no deeper than settings ever are."""
+    if isinstance(value, dict):
+        value = list(value.values())
+    if not isinstance(value, list):
+        return True
+    return levels > 0 and all(_is_shallow(item, levels - 1) for item in value)

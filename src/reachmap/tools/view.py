@@ -17,14 +17,20 @@ from reachmap.maps.records import BinMap
 from reachmap.tools.options import cell_of_artefact
 from reachmap.tools.prologue import path_of_cell, refuse_cell_files
 from reachmap.view.engine import HOST, require_viewer, start_server, stop_server
+from reachmap.view.guard import Guard
 
 PORT = 8080
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ViewOptions:
-    """How the live view is served."""
+    """How the live view is served.
 
+    On an address other than those of this machine alone, a token is part of the
+    address that is told, and nobody is let in without it.
+    """
+
+    host: str = HOST
     port: int = PORT
     open_browser: bool = False
 
@@ -94,10 +100,11 @@ def view(
     from reachmap.view.app import App
 
     options = options or ViewOptions()
-    server = start_server(options.port)
+    guard = Guard(options.host)
+    server = start_server(options.port, host=options.host, guard=guard)
     try:
         App(server, record, cell, paths[0] if paths else None)
-        address = f"http://{HOST}:{server.get_port()}"
+        address = _address(options.host, server.get_port(), guard.token)
         on_ready(address)
         if options.open_browser:
             webbrowser.open(address)
@@ -105,6 +112,13 @@ def view(
     finally:
         stop_server(server)
     return None
+
+
+def _address(host: str, port: int, token: str) -> str:
+    """Address of the view; where it listens everywhere, as this machine sees it."""
+    name = {"0.0.0.0": HOST, "::": "::1"}.get(host, host)
+    name = f"[{name}]" if ":" in name else name
+    return f"http://{name}:{port}" + (f"/?token={token}" if token else "")
 
 
 def _read(source: Path) -> tuple[Artefact | None, LoadedCell]:

@@ -8,6 +8,7 @@ import socket
 from typing import TYPE_CHECKING
 
 from reachmap.errors import MissingExtraError, OutputError
+from reachmap.view.guard import Guard, posted
 
 if TYPE_CHECKING:
     import viser
@@ -35,25 +36,31 @@ def require_viewer() -> None:
     del trimesh, viser
 
 
-def start_server(port: int) -> viser.ViserServer:
-    """Start a viewer that this machine alone can see.
+def start_server(
+    port: int, *, host: str = HOST, guard: Guard | None = None
+) -> viser.ViserServer:
+    """Start a viewer that only the page it serves can talk to.
 
     Parameters
     ----------
     port : int
         0 takes a free one.
+    host : str
+        Address to listen on; by default this machine alone can see it.
+    guard : Guard, optional
+        Knows the token where the address is not of this machine alone.
 
     Raises
     ------
     OutputError
-        The port is taken.
+        The port is taken, or the address is not one of this machine.
     """
     require_viewer()
     import viser
 
     # It greets on stdout, which belongs to the command's answer.
-    with contextlib.redirect_stdout(io.StringIO()):
-        server = viser.ViserServer(host=HOST, port=free_port(port), verbose=False)
+    with contextlib.redirect_stdout(io.StringIO()), posted(guard or Guard(host)):
+        server = viser.ViserServer(host=host, port=free_port(port, host), verbose=False)
     server.scene.set_up_direction("+z")
     server.scene.world_axes.visible = False
     _light(server)
@@ -78,21 +85,24 @@ def _light(server: viser.ViserServer) -> None:
     server.scene.add_light_ambient("/light", intensity=AMBIENT)
 
 
-def free_port(port: int) -> int:
-    """Give a port that is free: the given one, or for 0 any.
+def free_port(port: int, host: str = HOST) -> int:
+    """Give a port of an address that is free: the given one, or for 0 any.
 
     Raises
     ------
     OutputError
-        It is taken; viser itself would silently go to the next one.
+        It is taken, where viser itself would silently go to the next one; or the
+        address is not one of this machine.
     """
-    with socket.socket() as probe:
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    with socket.socket(family) as probe:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
-            probe.bind((HOST, port))
-        except OSError as error:
+            probe.bind((host, port))
+        except (OSError, UnicodeError) as error:
+            reason = getattr(error, "strerror", None) or error
             raise OutputError(
-                f"port {port} cannot be used ({error.strerror}); "
+                f"port {port} cannot be used on {host} ({reason}); "
                 "--port names another, --port 0 any free one"
             ) from error
         return int(probe.getsockname()[1])

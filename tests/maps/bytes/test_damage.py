@@ -1,10 +1,14 @@
 """Damaged files: a clean error or exactly what was written, never anything else."""
 
+import os
+import signal
+import subprocess
 from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 import pytest
 
@@ -17,8 +21,9 @@ from reachmap.maps import (
     write_placement,
     write_workspace_map,
 )
-from reachmap.maps.bytes import integrity
-from reachmap.maps.bytes.integrity import SEAL_BYTES
+from reachmap.maps.bytes import integrity, isolation
+from reachmap.maps.bytes.hdf5 import StructureError
+from reachmap.maps.bytes.integrity import SEAL_BYTES, seal, unseal
 from tests.support.map_asserts import assert_records_equal
 from tests.support.synthetic_maps import (
     synthetic_bin_map,
@@ -172,11 +177,85 @@ def test_hdf5_is_given_a_limited_time(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Without a seal the file is tried out elsewhere, and that is not waited for."""
+    """Where no copy can be made, an unsealed file is tried out elsewhere, briefly."""
     original, _, read = originals[2]
     path = tmp_path / "unsealed.h5"
     path.write_bytes(original[:-SEAL_BYTES])
+    monkeypatch.setattr(isolation, "_can_copy", lambda: False)
     monkeypatch.setattr(integrity, "TIME_LIMIT_S", 0.0)
     monkeypatch.setattr(integrity, "SECONDS_PER_BYTE", 0.0)
     with pytest.raises(MapFileError, match="damaged, HDF5 cannot read it"):
         read(path)
+
+
+def for_ever(image: bytes) -> None:
+    """Never come to an end, as HDF5 does not on some images."""
+    while True:
+        pass
+
+
+def crash(image: bytes) -> None:
+    """End the process, as HDF5 does on some images."""
+    os.kill(os.getpid(), signal.SIGSEGV)
+
+
+@pytest.mark.parametrize("function", [for_ever, crash])
+def test_no_image_blocks_or_crashes_this_process(
+    function: Callable[[bytes], None], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Not even one with a fitting seal: the copy ends, and that is all."""
+    monkeypatch.setattr(isolation, "CPU_LIMIT_S", 0.5)
+    before = len(list(Path("/proc/self/fd").iterdir()))
+    with pytest.raises(StructureError, match="HDF5 cannot read it"):
+        isolation.isolated(function, b"", trusted=True)
+    assert len(list(Path("/proc/self/fd").iterdir())) == before
+    assert subprocess.run(["pgrep", "-P", str(os.getpid())], check=False).returncode
+
+
+def test_what_a_copy_finds_comes_back() -> None:
+    """Arrays of any size, which can be written to, and what a reader complains of."""
+    big = isolation.isolated(lambda image: np.arange(10**6), b"", trusted=False)
+    big += 1
+    assert big.sum() == 500000500000
+
+    def complain(image: bytes) -> None:
+        raise StructureError("paths lacks data")
+
+    with pytest.raises(StructureError, match="paths lacks data"):
+        isolation.isolated(complain, b"", trusted=True)
+
+
+def test_a_file_open_for_writing_is_called_that(tmp_path: Path) -> None:
+    """Nothing is damaged; once the other program has closed it, all is well."""
+    path = tmp_path / "p.h5"
+    write_placement(path, synthetic_placement())
+    expected = pytest.raises(MapFileError, match="open for writing in another program")
+    with h5py.File(path, "r+"), expected:
+        read_placement(path)
+    assert read_placement(path).chosen == 0
+
+
+@pytest.mark.parametrize("where", ["attribute", "attribute name", "group", "text"])
+def test_bytes_that_are_not_utf_8_are_damage(tmp_path: Path, where: str) -> None:
+    """Wherever HDF5 keeps text; with a fitting seal or without one."""
+    path = tmp_path / "p.h5"
+    write_placement(path, synthetic_placement())
+    kind = h5py.h5t.C_S1.copy()
+    kind.set_size(4)
+    kind.set_cset(h5py.h5t.CSET_UTF8)
+    with h5py.File(path, "r+") as file:
+        if where == "attribute":
+            file.attrs.create("title", b"\xff\xfe", dtype=h5py.Datatype(kind))
+        elif where == "attribute name":
+            space = h5py.h5s.create(h5py.h5s.SCALAR)
+            h5py.h5a.create(file.id, b"\xff", kind, space)
+        elif where == "group":
+            h5py.h5g.create(file.id, b"\xff")
+        else:
+            del file["run/host"]
+            file["run"].create_dataset("host", data=np.bytes_(b"\xff"), dtype="S4")
+    for name in ("unsealed", "sealed"):
+        image = unseal(path.read_bytes())[0]
+        path.write_bytes(image + (seal(image) if name == "sealed" else b""))
+        with pytest.raises(MapFileError, match=r"p\.h5: damaged, "):
+            read_placement(path)

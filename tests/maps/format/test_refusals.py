@@ -1,5 +1,6 @@
 """Files that are not what was asked for: one clear line, never a traceback."""
 
+import dataclasses
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -20,9 +21,12 @@ from reachmap.maps import (
     write_placement,
     write_workspace_map,
 )
-from reachmap.maps.bytes import integrity
+from reachmap.maps.bytes import integrity, isolation
+from reachmap.maps.bytes.hashing import content_sha256, integrity_sha256
+from reachmap.maps.bytes.hdf5 import image_from_tree
 from reachmap.maps.bytes.integrity import SEAL_BYTES
-from reachmap.maps.format import store
+from reachmap.maps.bytes.tree import Tree
+from reachmap.maps.format import bin as bin_format
 from tests.support.synthetic_maps import (
     synthetic_bin_map,
     synthetic_placement,
@@ -34,7 +38,7 @@ from tests.support.synthetic_maps import (
 def _inspect_here(monkeypatch: pytest.MonkeyPatch, request: Any) -> None:
     """Files without a seal are tried out in this process, which is quicker."""
     if "elsewhere" not in request.node.name:
-        monkeypatch.setattr(store, "reason_against", integrity.inspect)
+        monkeypatch.setattr(isolation, "reason_against", integrity.inspect)
 
 
 @pytest.fixture
@@ -230,3 +234,36 @@ def test_nothing_is_left_open(bin_file: Path) -> None:
     for _ in range(5):
         error_of(read_workspace_map, bin_file)
     assert len(list(Path("/proc/self/fd").iterdir())) == before
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (("paths/index", 255), "paths/index must name test grasps"),
+        (("provenance/overrides_json", '[["a"]]'), "not a list of texts"),
+        (("provenance/overrides_json", "[" * 500 + "]" * 500), "not a JSON list as"),
+        (("provenance/settings_json", '{"a":' * 500 + "1" + "}" * 500), "not a JSON d"),
+        (("run/wall_s_json", "[1]"), "not a JSON dict"),
+        (("run/workers", "many"), "not a number"),
+    ],
+)
+def test_forged_values_are_refused(
+    tmp_path: Path, change: tuple[str, Any], message: str
+) -> None:
+    """Also where hashes and seal were made to fit: what is read is checked."""
+    path, (name, value) = tmp_path / "bin.h5", change
+    tree = assembled(bin_format.tree_from_bin_map(synthetic_bin_map()))
+    leaf = tree.leaves[name]
+    if not isinstance(value, str):
+        value = np.full_like(np.asarray(leaf.value), value)
+    tree.leaves[name] = dataclasses.replace(leaf, value=value)
+    image = image_from_tree(assembled(tree))
+    path.write_bytes(image + integrity.seal(image))
+    assert message in error_of(read_bin_map, path)
+
+
+def assembled(tree: Tree) -> Tree:
+    """Let both checksums of a tree fit it."""
+    tree.attributes["content_sha256"] = content_sha256(tree)
+    tree.attributes["integrity_sha256"] = integrity_sha256(tree)
+    return tree

@@ -188,6 +188,8 @@ def _walk(group: Any, prefix: str, seen: set[int]) -> Iterator[tuple[str, Any]]:
     """Every group and dataset below a group; hard links only, each object once."""
     for name in group:
         path = f"{prefix}{name}"
+        if not path.isprintable():
+            raise StructureError(f"an object has the name {path!a}")
         if not isinstance(group.get(name, getlink=True), h5py.HardLink):
             raise StructureError(f"{path} is a link to another place")
         item = group[name]
@@ -248,7 +250,7 @@ def _read_leaf(path: str, dataset: Any) -> Leaf:
 
 
 def _dimension_name(dimension: Any) -> str:
-    return str(dimension[0].name).rpartition("/")[2] if len(dimension) else ""
+    return ascii(dimension[0].name)[1:-1].rpartition("/")[2] if len(dimension) else ""
 
 
 def _read_attributes(target: Any) -> dict[str, Any]:
@@ -257,7 +259,19 @@ def _read_attributes(target: Any) -> dict[str, Any]:
         if name in _INTERNAL:
             continue
         try:
-            values[str(name)] = plain(target.attrs[name])
-        except TypeError as error:
-            raise StructureError(f"its attribute {name} cannot be read") from error
+            values[str(name)] = value = plain(target.attrs[name])
+            _require_utf8([name, value])
+        except (TypeError, UnicodeEncodeError) as error:
+            raise StructureError(
+                f"its attribute {name!a} cannot be read, or is not UTF-8"
+            ) from error
     return values
+
+
+def _require_utf8(value: Any) -> None:
+    """Raise UnicodeEncodeError for bytes that h5py passes on as lone surrogates."""
+    if isinstance(value, str):
+        value.encode()
+    elif isinstance(value, list):
+        for item in value:
+            _require_utf8(item)

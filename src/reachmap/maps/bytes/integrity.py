@@ -60,6 +60,17 @@ def named_size(image: bytes) -> int | None:
     return int.from_bytes(image[start : start + 8], "little") if start else None
 
 
+def is_open_for_writing(image: bytes) -> bool:
+    """Whether the superblock says that a program has the file open for writing.
+
+    A program that crashed leaves the flag behind.
+    """
+    if len(image) < 24:
+        return False
+    # Place of the consistency flags, by version of the superblock; bit 0 is writing.
+    return bool(image[11 if image[8] >= 2 else 20] & 1)
+
+
 TIME_LIMIT_S = 15.0
 SECONDS_PER_BYTE = 0.5e-6
 

@@ -17,11 +17,12 @@ from reachmap.maps.bytes.hdf5 import (
 )
 from reachmap.maps.bytes.integrity import (
     SIGNATURE,
+    is_open_for_writing,
     named_size,
-    reason_against,
     seal,
     unseal,
 )
+from reachmap.maps.bytes.isolation import isolated
 from reachmap.maps.bytes.publish import publish
 from reachmap.maps.bytes.tree import Tree
 from reachmap.maps.format.contract import check_ranges, check_structure
@@ -33,6 +34,10 @@ from reachmap.maps.format.layout import (
 )
 from reachmap.maps.format.upgrade import upgraded
 
+OPEN_ELSEWHERE = (
+    "open for writing in another program, or left so by one that crashed; close it "
+    "there and try again"
+)
 MAX_PROBLEMS = 8
 """Mistakes of one file that are listed before the rest is only counted."""
 
@@ -75,16 +80,18 @@ def load(path: Path, *layouts: Layout) -> tuple[Tree, Layout]:
         The file is missing, damaged, of another kind, of a newer major version or
         not an artefact at all.
     """
-    image = read_image(path, layouts)
+    image, intact = read_image(path, layouts)
     try:
-        found = identify(path, identity_from_image(image), layouts)
-        tree = tree_from_image(image)
+        identity, tree = isolated(_read, image, trusted=intact)
     except StructureError as error:
-        raise MapFileError(f"{path}: damaged, {error}; {_expected(layouts)}") from error
+        raise _damaged(path, image, str(error), layouts) from error
+    found = identify(path, identity, layouts)
     problems = check_hashes(tree)[:1]
     if not problems:
         tree = upgraded(tree)
         problems = check_tree(tree, found)
+    if problems and is_open_for_writing(image):
+        raise MapFileError(f"{path}: {OPEN_ELSEWHERE}")
     if problems:
         raise MapFileError(
             f"{path}: damaged {found.name}, {text}; `{found.command}` makes a new one"
@@ -93,10 +100,20 @@ def load(path: Path, *layouts: Layout) -> tuple[Tree, Layout]:
     return tree, found
 
 
+def _read(image: bytes) -> tuple[dict[str, str], Tree]:
+    """Say what an image is, and read it if that is an artefact."""
+    identity = identity_from_image(image)
+    is_ours = kind_of_format(identity.get("format")) is not None
+    return identity, tree_from_image(image) if is_ours else Tree()
+
+
 def check_tree(tree: Tree, layout: Layout) -> list[str]:
     """Check structure, then ranges, then what the numbers say to each other."""
-    return check_structure(tree, layout) or (
-        check_ranges(tree, layout) + layout.check(tree)
+    # What numbers say to each other can be asked of numbers in their ranges only.
+    return (
+        check_structure(tree, layout)
+        or check_ranges(tree, layout)
+        or layout.check(tree)
     )
 
 
@@ -110,24 +127,34 @@ def check_hashes(tree: Tree) -> list[str]:
     return problems
 
 
-def read_image(path: Path, layouts: Sequence[Layout] = ()) -> bytes:
-    """Read a file as an HDF5 image that is safe to hand to the HDF5 library."""
+def read_image(path: Path, layouts: Sequence[Layout] = ()) -> tuple[bytes, bool]:
+    """Read a file as an HDF5 image that is whole, as far as its bytes tell.
+
+    Returns
+    -------
+    image : bytes
+    intact : bool
+        Whether it has a seal, which then fits.
+    """
     image, intact = unseal(read_bytes(path, layouts))
     if not image.startswith(SIGNATURE):
         raise MapFileError(f"{path}: {_foreign(image)}; {_expected(layouts)}")
-    if damage := _damage(image, intact):
-        raise MapFileError(f"{path}: damaged, {damage}; {_expected(layouts)}")
-    return image
-
-
-def _damage(image: bytes, intact: bool | None) -> str:
-    """What is wrong with the bytes of an image, "" if nothing is."""
-    if intact is not None:
-        return "" if intact else "its bytes do not match its seal"
+    if intact is False:
+        raise _damaged(path, image, "its bytes do not match its seal", layouts)
     size = named_size(image)
-    if size is None or len(image) < size:
-        return f"{len(image)} of {size or 'at least 48'} bytes are left"
-    return reason_against(image)
+    if not intact and (size is None or len(image) < size):
+        left = f"{len(image)} of {size or 'at least 48'} bytes are left"
+        raise _damaged(path, image, left, layouts)
+    return image, bool(intact)
+
+
+def _damaged(
+    path: Path, image: bytes, reason: str, layouts: Sequence[Layout]
+) -> MapFileError:
+    """Word what is wrong with the bytes of an image."""
+    if is_open_for_writing(image):
+        return MapFileError(f"{path}: {OPEN_ELSEWHERE}")
+    return MapFileError(f"{path}: damaged, {reason}; {_expected(layouts)}")
 
 
 def read_bytes(path: Path, layouts: Sequence[Layout] = ()) -> bytes:
@@ -156,8 +183,9 @@ def artefact_kind(path: Path) -> str | None:
     Never raises. Only the seal and the root attributes are looked at.
     """
     try:
-        image = read_image(Path(path))
-        return kind_of_format(identity_from_image(image).get("format"))
+        image, intact = read_image(Path(path))
+        identity = isolated(identity_from_image, image, trusted=intact)
+        return kind_of_format(identity.get("format"))
     except (ReachmapError, ValueError, StructureError):
         return None
 

@@ -11,6 +11,35 @@ from reachmap.ranking.lists.fields import shown
 MAX_YAML_BYTES: Final = 2 * 2**20
 
 
+MAX_DEPTH: Final = 16
+"""Nesting of a document; a list of grasps has 5 levels."""
+
+
+def _parser() -> type[Any]:
+    """Parser of YAML that refuses deep nesting, on which the reader takes for ever."""
+    from ruamel.yaml.error import MarkedYAMLError
+    from ruamel.yaml.events import CollectionEndEvent, CollectionStartEvent
+    from ruamel.yaml.parser import Parser
+
+    class ShallowParser(Parser):  # type: ignore[misc, unused-ignore]
+        depth = 0
+
+        def get_event(self) -> Any:
+            event = super().get_event()
+            if isinstance(event, CollectionStartEvent):
+                self.depth += 1
+            elif isinstance(event, CollectionEndEvent):
+                self.depth -= 1
+            if self.depth > MAX_DEPTH:
+                raise MarkedYAMLError(
+                    problem=f"nested more than {MAX_DEPTH} levels deep",
+                    problem_mark=event.start_mark,
+                )
+            return event
+
+    return ShallowParser
+
+
 def data_from_yaml(text: str, source: str) -> Any:
     """Parse YAML without tags, refusing repeated keys."""
     # Imported here: ranking native lists needs no YAML reader.
@@ -19,8 +48,10 @@ def data_from_yaml(text: str, source: str) -> Any:
 
     if len(text) > MAX_YAML_BYTES:
         raise GraspListError(f"{source}: YAML of more than {MAX_YAML_BYTES} bytes")
+    reader = YAML(typ="safe", pure=True)
+    reader.Parser = _parser()
     try:
-        return YAML(typ="safe", pure=True).load(text)
+        return reader.load(text)
     except YAMLError as error:
         mark = getattr(error, "problem_mark", None)
         where = f":{mark.line + 1}:{mark.column + 1}" if mark else ""
