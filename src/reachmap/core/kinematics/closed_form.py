@@ -15,8 +15,9 @@ import numpy as np
 from eaik.pybindings import EAIK
 
 from reachmap._typing import BoolArray, FloatArray
+from reachmap.core.kinematics.least_squares import least_squares_many
 from reachmap.core.kinematics.nominal import nominal_arms, rounded_arm
-from reachmap.core.kinematics.refine import matrix_difference, refine_many
+from reachmap.core.kinematics.refine import matrix_difference
 from reachmap.core.kinematics.solutions import Rows, angular_distance
 from reachmap.core.robot.chain import SerialChain
 
@@ -105,12 +106,15 @@ class ClosedForm:
     is_nominal : bool
         Whether the closed form is of another arm, from whose rows steps lead to the
         arm's solutions.
+    kind : int
+        Which of the nominal arms it is of.
     score : int
         Configurations of the self-test that are found again, of `SELF_TESTS`.
     """
 
     rows: EaikRows
     is_nominal: bool
+    kind: int
     score: int = 0
 
     @property
@@ -120,20 +124,29 @@ class ClosedForm:
 
 
 def find_closed_form(
-    chain: SerialChain, *, tolerance: float = ACCEPTED, tests: int = SELF_TESTS
+    chain: SerialChain,
+    *,
+    tolerance: float = ACCEPTED,
+    tests: int = SELF_TESTS,
+    like: ClosedForm | None = None,
 ) -> ClosedForm | None:
     """Closed form that finds random configurations of an arm again, if there is one.
 
     The nearest nominal arm is preferred, and of it the one with the fewest axes added,
-    unless a later one passes more of the self-test, `tests` configurations.
+    unless a later one passes more of the self-test, `tests` configurations. With
+    `like`, only the nominal arm is looked at that gave this form of a similar arm.
     """
     if not chain.is_revolute.all() or chain.dof > _AXES:
         return None
     best = None
     for form in _candidates(chain):
-        if _count(form, chain, _TRIALS, tolerance) < _TRIALS - 2:
+        if like is not None and form.kind != like.kind:
             continue
-        score = _count(form, chain, tests, tolerance)
+        score = _count(form, chain, _TRIALS, tolerance)
+        if score < _TRIALS - 2:
+            continue
+        if tests > _TRIALS:
+            score = _count(form, chain, tests, tolerance)
         if best is None or score > best.score:
             best = replace(form, score=score)
         if score == tests:
@@ -145,12 +158,13 @@ def _candidates(chain: SerialChain) -> Iterator[ClosedForm]:
     """Forms that EAIK claims to know."""
     Q = np.random.default_rng(0).uniform(-np.pi, np.pi, (_TRIALS, chain.dof))
     poses = chain.forward_many(Q)
-    for nominal in nominal_arms(chain):
+    for kind, nominal in enumerate(nominal_arms(chain)):
         apart = matrix_difference(poses, nominal.forward_many(Q)).max()
         for padded in _padded(nominal):
             rows = _rows(padded, chain.dof)
             if rows is not None:
-                yield ClosedForm(rows=rows, is_nominal=bool(apart > 10 * MET))
+                is_nominal = bool(apart > 10 * MET)
+                yield ClosedForm(rows=rows, is_nominal=is_nominal, kind=kind)
 
 
 def _count(form: ClosedForm, chain: SerialChain, count: int, tolerance: float) -> int:
@@ -192,7 +206,9 @@ def _found_again(
     residual = matrix_difference(T[frame], chain.forward_many(found))
     near = residual <= form.near
     found, frame = found[near], frame[near]
-    found, residual = refine_many(chain, found, T[frame], tolerance=1e-9, iterations=20)
+    found, residual = least_squares_many(
+        chain, found, T[frame], tolerance=1e-9, iterations=20
+    )
     apart = angular_distance(found - Q[frame], chain.is_revolute).max(axis=1)
     good = (residual < tolerance) & (apart < max(1e-5, _ROUNDED_APART * tolerance))
     return np.isin(np.arange(count), frame[good])

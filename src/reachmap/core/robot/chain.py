@@ -24,7 +24,7 @@ _BLOCK = 256
 
 # Sine of the angle from a half turn below which the axis is read off another part of
 # the rotation; both parts are good to 1e-13 there.
-_NEAR_HALF_TURN = 1e-2
+NEAR_HALF_TURN = 1e-2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -233,13 +233,13 @@ def pose_error(T_goal: FloatArray, T: FloatArray) -> FloatArray:
     scale = np.where(sine > 1e-12, angle / np.maximum(sine, 1e-12), 1.0)
     error[:, 3:] = v * scale[:, None]
     # Towards a half turn v vanishes, and with it the direction that it gives.
-    far = np.flatnonzero((cosine < 0.0) & (sine < _NEAR_HALF_TURN))
+    far = np.flatnonzero((cosine < 0.0) & (sine < NEAR_HALF_TURN))
     if len(far):
-        error[far, 3:] = _axis_of_half_turn(D[far], v[far]) * angle[far, None]
+        error[far, 3:] = axis_of_half_turn(D[far], v[far]) * angle[far, None]
     return error
 
 
-def _axis_of_half_turn(D: FloatArray, v: FloatArray) -> FloatArray:
+def axis_of_half_turn(D: FloatArray, v: FloatArray) -> FloatArray:
     """Unit axes of rotations by nearly a half turn, (n, 3, 3) to (n, 3).
 
     Parameters

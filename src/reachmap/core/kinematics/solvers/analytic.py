@@ -17,6 +17,7 @@ from reachmap.core.kinematics.closed_form import (
     ClosedForm,
     find_closed_form,
 )
+from reachmap.core.kinematics.least_squares import least_squares_many
 from reachmap.core.kinematics.refine import matrix_difference, refine_many
 from reachmap.core.kinematics.solutions import (
     Rows,
@@ -139,19 +140,18 @@ class AnalyticSolver:
         near = ~met & (residual <= self._form.near)
         if not near.any():
             return distinct((Q[met], frame[met]), self._chain.is_revolute)
-        Q_near, missed = refine_many(
-            self._chain,
-            Q[near],
-            T[frame[near]],
-            tolerance=1e-11 if self._form.is_nominal else 1e-13,
-            iterations=30,
-            singular=not (self._form.is_nominal or self.tolerance > ACCEPTED),
-        )
+        Q_near, missed = self._steps(Q[near], T[frame[near]])
         good = missed <= self.tolerance
         Q_near = wrapped(Q_near, self._chain.is_revolute)
         polished = (Q_near[good], frame[near][good])
         rows = joined([(Q[met], frame[met]), polished], self._chain.dof)
         return distinct(rows, self._chain.is_revolute)
+
+    def _steps(self, Q: FloatArray, T: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Steps to poses: of all rows of a nominal arm, else of few and singular."""
+        if not (self._form.is_nominal or self.tolerance > ACCEPTED):
+            return refine_many(self._chain, Q, T)
+        return least_squares_many(self._chain, Q, T, tolerance=1e-10, iterations=30)
 
     def _jumps(self, raw: Rows, T: FloatArray, frames: IntArray) -> BoolArray:
         """Whether the rows of a pose jump when the pose is turned aside.
@@ -174,9 +174,7 @@ class AnalyticSolver:
         """Solve poses turned aside, and come back to the poses themselves."""
         Q, index = self._rows(T[frames] @ turn)
         frame = frames[index]
-        Q, residual = refine_many(
-            self._chain, Q, T[frame], tolerance=1e-13, iterations=30, singular=True
-        )
+        Q, residual = refine_many(self._chain, Q, T[frame])
         good = residual <= self.tolerance
         return Q[good], frame[good]
 

@@ -7,19 +7,39 @@ from __future__ import annotations
 
 import numpy as np
 
-from reachmap._typing import FloatArray
-from reachmap.core.kinematics.refine import refine_many
+from reachmap._typing import BoolArray, FloatArray, IntArray
+from reachmap.core.kinematics.least_squares import least_squares_many
+from reachmap.core.kinematics.seeds import SeedTable, spread_points
 from reachmap.core.kinematics.solutions import Rows, distinct, joined, wrapped
 from reachmap.core.kinematics.solvers.arm import Arm, Way
 
-_ITERATIONS = 60
+# Rows of the table of starts that are looked at, per start that is asked for: a third
+# of them shares a cell with a nearer one.
+_ROWS_PER_START = 1.5
 
-# Starts per block, which bounds the memory.
-_SEEDS_PER_BLOCK = 4096
+# The first steps are made in single precision, for all starts; then those that have
+# come together are one [rad or m], unless they are further from the pose.
+_FIRST_STEPS = 3
+_TOGETHER = 0.1
+_NEAR = 0.1
+
+# Rows that still miss by more [m or rad] are given up: of 400 poses each of HC10,
+# M-430iA and xArm6 that lost no solution.
+_HOPELESS = 0.4
+
+# Other starts lead to the solutions of rows that take longer.
+_LAST_STEPS = 30
+_PATIENCE = 4
+
+# Arms of so few joints need no table.
+_FEW_JOINTS = 2
+
+# Poses per block, which bounds the memory.
+_BLOCK = 1024
 
 
 class NumericSolver:
-    """Branches found from a fixed set of starts.
+    """Branches found from starts near the pose.
 
     Parameters
     ----------
@@ -33,15 +53,28 @@ class NumericSolver:
 
     def __init__(self, arm: Arm) -> None:
         self._chain, self.tolerance = arm.chain, arm.tolerance
-        half = (arm.upper - arm.lower) / 2
+        middle, half = (arm.lower + arm.upper) / 2, (arm.upper - arm.lower) / 2
         half = np.where(arm.chain.is_revolute, np.minimum(half, np.pi), half)
-        spread = 2.0 * _spread_points(arm.spec.restarts, arm.chain.dof) - 1.0
-        self._starts = (arm.lower + arm.upper) / 2 + spread * half
+        self._restarts = arm.spec.restarts
+        self._table: SeedTable | None = None
+        if arm.chain.dof > _FEW_JOINTS:
+            self._table = SeedTable(arm.chain, middle, half)
+        spread = 2.0 * spread_points(self._restarts, arm.chain.dof) - 1.0
+        self._starts = middle + spread * half
 
     @property
     def approximation(self) -> str:
         """How solutions are sought."""
-        return f"least squares from {len(self._starts)} starts"
+        if self._table is None:
+            return f"least squares from {self._restarts} starts"
+        return (
+            f"least squares from up to {self._count} starts: the nearest of "
+            f"{len(self._table)} configurations"
+        )
+
+    @property
+    def _count(self) -> int:
+        return int(np.ceil(_ROWS_PER_START * self._restarts))
 
     def branches(self, T: FloatArray) -> Rows:
         """Solutions that meet their poses, without limits and turns.
@@ -51,37 +84,53 @@ class NumericSolver:
         T : array, shape (n, 4, 4)
             Poses T_base_tcp.
         """
-        count = len(self._starts)
-        per_block = max(1, _SEEDS_PER_BLOCK // count)
         tables = []
-        for start in range(0, len(T), per_block):
-            goals = T[start : start + per_block]
-            frame = np.repeat(np.arange(len(goals)), count)
-            Q, residual = refine_many(
-                self._chain,
-                np.tile(self._starts, (len(goals), 1)),
-                goals[frame],
-                tolerance=1e-11,
-                iterations=_ITERATIONS,
-            )
-            good = residual <= self.tolerance
-            rows = (wrapped(Q[good], self._chain.is_revolute), frame[good] + start)
-            tables.append(distinct(rows, self._chain.is_revolute))
+        for start in range(0, len(T), _BLOCK):
+            Q, frame = self._block(T[start : start + _BLOCK])
+            tables.append((Q, frame + start))
         return joined(tables, self._chain.dof)
 
+    def _block(self, T: FloatArray) -> Rows:
+        if self._table is None:
+            frame = np.repeat(np.arange(len(T)), len(self._starts))
+            Q = np.tile(self._starts, (len(T), 1))
+        else:
+            Q, frame = self._table.starts(T, self._count)
+            near, residual = least_squares_many(
+                self._chain,
+                Q.astype(np.float32),
+                T[frame],
+                tolerance=1e-5,
+                iterations=_FIRST_STEPS,
+            )
+            keep = _apart(wrapped(near, self._chain.is_revolute), frame, residual)
+            Q, frame = near[keep].astype(float), frame[keep]
+        Q, residual = least_squares_many(
+            self._chain,
+            Q,
+            T[frame],
+            tolerance=1e-10,
+            iterations=_LAST_STEPS,
+            patience=_PATIENCE if self._table else _LAST_STEPS,
+        )
+        good = residual <= self.tolerance
+        rows = (wrapped(Q[good], self._chain.is_revolute), frame[good])
+        return distinct(rows, self._chain.is_revolute)
 
-def _spread_points(count: int, dimension: int) -> FloatArray:
-    """Evenly spread points of the unit cube, shape (count, dimension).
 
-    An additive recurrence with powers of the generalised golden ratio: without
-    random numbers every pose gets the same starts in every run, and they leave
-    smaller gaps than random ones.
-    """
-    ratio = 2.0
-    for _ in range(60):
-        ratio = (1.0 + ratio) ** (1.0 / (dimension + 1))
-    steps = ratio ** -np.arange(1.0, dimension + 1)
-    return np.asarray((0.5 + np.arange(count)[:, None] * steps) % 1.0)
+def _apart(Q: FloatArray, frame: IntArray, residual: FloatArray) -> BoolArray:
+    """Whether a row is worth more steps, and the nearest of those come together."""
+    cells = np.floor(Q / _TOGETHER).astype(np.int64)
+    key = frame.astype(np.int64)
+    for column in cells.T:
+        # An odd factor mixes the cells; what collides by chance is one in 2⁶⁰.
+        key = key * np.int64(6364136223846793005) + column
+    order = np.lexsort((residual, key))
+    first = np.ones(len(key), bool)
+    first[1:] = key[order][1:] != key[order][:-1]
+    keep = np.zeros(len(key), bool)
+    keep[order[first]] = True
+    return (keep | (residual > _NEAR)) & (residual < _HOPELESS)
 
 
 WAY = Way(rank=9, is_closed_form=False, offer=NumericSolver)

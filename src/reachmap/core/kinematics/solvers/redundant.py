@@ -19,7 +19,8 @@ from reachmap.core.kinematics.closed_form import (
     ClosedForm,
     find_closed_form,
 )
-from reachmap.core.kinematics.refine import matrix_difference, refine_many
+from reachmap.core.kinematics.least_squares import least_squares_many
+from reachmap.core.kinematics.refine import matrix_difference
 from reachmap.core.kinematics.solutions import (
     Rows,
     can_be_within,
@@ -39,6 +40,11 @@ _NEAR_NOMINAL = 0.2
 # Self-test of the closed form for each value; the whole is never complete anyway.
 _TESTS = 12
 
+# Poses that tell whether a joint is one to sample, and the share of them that is good
+# enough: Panda, iiwa and xArm7 reach it with their last joint.
+_POSES = 60
+_GOOD_SHARE = 0.9
+
 # Frames per block, which bounds the memory.
 _BLOCK = 256
 
@@ -51,6 +57,8 @@ class RedundantSolver:
     arm : Arm
     joints : tuple of int
         Joints that are sampled.
+    like : ClosedForm
+        Closed form of the other joints at typical values of these.
 
     Attributes
     ----------
@@ -62,7 +70,7 @@ class RedundantSolver:
     complete = False
     tolerance = ACCEPTED
 
-    def __init__(self, arm: Arm, joints: tuple[int, ...]) -> None:
+    def __init__(self, arm: Arm, joints: tuple[int, ...], like: ClosedForm) -> None:
         self._arm, self._chain = arm, arm.chain
         self._lower, self._upper = arm.lower, arm.upper
         self._joints = joints
@@ -70,7 +78,7 @@ class RedundantSolver:
         self.values: list[tuple[float, ...]] = []
         self._forms: list[ClosedForm] = []
         for values in product(*self._grids()):
-            form = _closed_form_with(arm, joints, values)
+            form = _closed_form_with(arm, joints, values, like)
             if form is not None:
                 self.values.append(values)
                 self._forms.append(form)
@@ -117,7 +125,25 @@ class RedundantSolver:
             tables.append((Q, frame + start))
         return joined(tables, self._chain.dof)
 
+    def share_on_grid(self) -> float:
+        """Share of random poses that have a solution at a value of the grid.
+
+        The elbow of an arm with a spherical shoulder and wrist, for example, is no
+        joint to sample: the distance of the wrist determines it.
+        """
+        rng = np.random.default_rng(0)
+        Q = rng.uniform(self._lower, self._upper, (_POSES, self._chain.dof))
+        rows, _ = self._on_grid(self._chain.forward_many(Q))
+        return len(np.unique(rows[1])) / _POSES
+
     def _block(self, T: FloatArray) -> Rows:
+        rows, raw = self._on_grid(T)
+        counts = np.bincount(rows[1], minlength=len(T))
+        more = self._between_samples(raw, T, np.flatnonzero(counts == 0))
+        return joined([rows, more], self._chain.dof)
+
+    def _on_grid(self, T: FloatArray) -> tuple[Rows, Rows]:
+        """Solutions, and the closed form's rows."""
         tables = [
             self._rows(form, values, T)
             for form, values in zip(self._forms, self.values, strict=True)
@@ -130,10 +156,8 @@ class RedundantSolver:
         if any(form.is_nominal for form in self._forms):
             near = ~met & (residual <= _NEAR_NOMINAL)
             solved.append(self._polished(Q[near], frame[near], T))
-        rows = distinct(joined(solved, self._chain.dof), self._chain.is_revolute)
-        counts = np.bincount(rows[1], minlength=len(T))
-        more = self._between_samples(raw, T, np.flatnonzero(counts == 0))
-        return joined([rows, more], self._chain.dof)
+        rows = joined(solved, self._chain.dof)
+        return distinct(rows, self._chain.is_revolute), raw
 
     def _rows(self, form: ClosedForm, values: tuple[float, ...], T: FloatArray) -> Rows:
         Q_others, frame = form.rows(T)
@@ -143,8 +167,8 @@ class RedundantSolver:
         return Q, frame
 
     def _polished(self, Q: FloatArray, frame: IntArray, T: FloatArray) -> Rows:
-        Q, missed = refine_many(
-            self._chain, Q, T[frame], tolerance=1e-11, iterations=30
+        Q, missed = least_squares_many(
+            self._chain, Q, T[frame], tolerance=1e-10, iterations=20
         )
         good = missed <= ACCEPTED
         return self._allowed((wrapped(Q[good], self._chain.is_revolute), frame[good]))
@@ -181,13 +205,16 @@ def _grid(lower: float, upper: float, samples: int, *, turns: bool) -> FloatArra
 
 
 def _closed_form_with(
-    arm: Arm, joints: tuple[int, ...], values: tuple[float, ...]
+    arm: Arm,
+    joints: tuple[int, ...],
+    values: tuple[float, ...],
+    like: ClosedForm | None = None,
 ) -> ClosedForm | None:
     """Closed form of the other joints while these stay at values."""
     chain = arm.chain
     for joint, value in sorted(zip(joints, values, strict=True), reverse=True):
         chain = chain.held(joint, value)
-    return find_closed_form(chain, tests=_TESTS)
+    return find_closed_form(chain, tests=_TESTS, like=like)
 
 
 def _candidates(arm: Arm) -> list[tuple[int, ...]]:
@@ -208,11 +235,18 @@ def _offer(arm: Arm) -> RedundantSolver | None:
         return None
     # A value that is special for no arm: held at zero, axes may become parallel.
     typical = arm.lower + 0.37 * (arm.upper - arm.lower)
+    best, most = None, 0.0
     for joints in _candidates(arm):
-        values = tuple(float(typical[k]) for k in joints)
-        if _closed_form_with(arm, joints, values) is not None:
-            return RedundantSolver(arm, joints)
-    return None
+        form = _closed_form_with(arm, joints, tuple(typical[k] for k in joints))
+        if form is None:
+            continue
+        solver = RedundantSolver(arm, joints, form)
+        share = solver.share_on_grid()
+        if share > most:
+            best, most = solver, share
+        if share >= _GOOD_SHARE:
+            break
+    return best
 
 
 WAY = Way(rank=2, is_closed_form=True, offer=_offer)
