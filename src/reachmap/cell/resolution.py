@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from pathlib import Path
 from typing import Any
 
@@ -48,7 +49,7 @@ def resolved_cell(
     data = cell.model_dump(mode="json")
     robot = data["robot"]
     data["resources"]["packages"] = {
-        name: str((directory / folder).absolute())
+        name: os.path.normpath((directory / folder).absolute())
         for name, folder in data["resources"]["packages"].items()
     }
     for key in ("urdf", "srdf"):

@@ -270,11 +270,12 @@ class _Attempt:
         return Scene.build(self._loaded())
 
     def _with_scan_configuration(self, scene: Scene, Q: FloatArray) -> tuple[str, ...]:
-        axis, joints = self.choices.approach_axis, self.choices.joints
+        axis, reach = self.choices.approach_axis, self.choices.reach_m
+        joints = self.choices.joints
         states = self._states()
         if states:
             rows = [[v[j.name] for j in joints] for v in states.values()]
-            seen = trial.best_view(scene, np.array(rows), axis)
+            seen = trial.best_view(scene, np.array(rows), axis, reach)
             if seen is not None and seen[1] >= LOOKS_DOWN:
                 names = list(states)
                 best = names.pop(seen[0])
@@ -284,7 +285,7 @@ class _Attempt:
                 f"no named state is free and looks down ({', '.join(states)}); "
                 "the scan configuration was searched for"
             )
-        found = trial.best_view(scene, Q, axis)
+        found = trial.best_view(scene, Q, axis, reach)
         if found is None:
             return ("no free scan configuration was found",)
         values = {

@@ -140,7 +140,9 @@ def _places(reach_m: float) -> Iterator[tuple[float, float, float, float]]:
                 yield x + 0.0, y + 0.0, round(height * reach_m, 3), 90.0 + angle_deg
 
 
-def best_view(scene: Scene, Q: FloatArray, axis: str) -> tuple[int, float] | None:
+def best_view(
+    scene: Scene, Q: FloatArray, axis: str, reach_m: float
+) -> tuple[int, float] | None:
     """Free configuration that looks down on the bin best.
 
     Parameters
@@ -150,6 +152,7 @@ def best_view(scene: Scene, Q: FloatArray, axis: str) -> tuple[int, float] | Non
         Candidates [rad].
     axis : str
         Axis of the TCP that looks.
+    reach_m : float
 
     Returns
     -------
@@ -163,10 +166,9 @@ def best_view(scene: Scene, Q: FloatArray, axis: str) -> tuple[int, float] | Non
         return None
     T = scene.kinematics.forward_many(Q[rows])
     column, sign = AXES[axis]
-    reach = np.linalg.norm(T[:, :2, 3], axis=1).max()
     over = T[:, :3, 3] - scene.T_base_bin[:3, 3]
-    off_centre = np.linalg.norm(over[:, :2], axis=1) / reach
-    height = np.abs(over[:, 2] / reach - 0.5)
+    off_centre = np.linalg.norm(over[:, :2], axis=1) / reach_m
+    height = np.abs(over[:, 2] / reach_m - 0.5)
     downwards = -sign * T[:, 2, column]
     effort = np.abs(Q[rows]).mean(axis=1) / np.pi
     best = int(np.argmax(downwards - off_centre - height - effort))
