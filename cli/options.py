@@ -252,6 +252,22 @@ list_options = compose(
         help="Weight of the distance between grasp and test grasp.",
     ),
     click.option(
+        "--normalise",
+        type=click.Choice(["quantile", "max"]),
+        default="quantile",
+        show_default=True,
+        help="What each term is divided by: its 95 % quantile over the reachable test "
+        "grasps, or its maximum, as in the paper.",
+    ),
+    click.option(
+        "--planning-time",
+        type=click.Choice(["checks", "measured"]),
+        default="checks",
+        show_default=True,
+        help="Planning effort: state checks, the same in every run of a scan, or the "
+        "CPU time that was measured, as in the paper.",
+    ),
+    click.option(
         "--neighbours",
         type=click.IntRange(1, 64),
         default=1,

@@ -70,6 +70,8 @@ def command(
     output: Path | None,
     weights: tuple[float, float, float],
     likeness: float,
+    normalise: Literal["quantile", "max"],
+    planning_time: Literal["checks", "measured"],
     neighbours: int,
     roll: Literal["as-given", "free", "fixed"],
     format_name: str | None,
@@ -98,7 +100,7 @@ def command(
       reachmap rank grasps.json --explain NW-12
     """
     from reachmap.cli.text.rank import ranking_tables
-    from reachmap.ranking.lookup.settings import RankSettings
+    from reachmap.ranking.lookup.settings import CostBasis, RankSettings
     from reachmap.tools.rank import ListFormat, rank
 
     to_stdout = output is None or str(output) == "-"
@@ -109,6 +111,7 @@ def command(
         settings=RankSettings(
             weights=weights, likeness=likeness, neighbours=neighbours, roll=roll
         ),
+        basis=CostBasis(normalise=normalise, planning_time=planning_time),
         list_format=ListFormat(
             name=format_name,
             frame=frame,

@@ -67,6 +67,8 @@ def command(
     top: int,
     weights: tuple[float, float, float],
     likeness: float,
+    normalise: Literal["quantile", "max"],
+    planning_time: Literal["checks", "measured"],
     neighbours: int,
     roll: Literal["as-given", "free", "fixed"],
     format_name: str | None,
@@ -94,7 +96,7 @@ def command(
       reachmap validate bin.h5 --random 500 -o results.json
     """
     from reachmap.cli.text.validate import validation_text
-    from reachmap.ranking.lookup.settings import RankSettings
+    from reachmap.ranking.lookup.settings import CostBasis, RankSettings
     from reachmap.tools.options import RunOptions
     from reachmap.tools.rank import ListFormat
     from reachmap.tools.validate import PickOptions, validate
@@ -106,6 +108,7 @@ def command(
         settings=RankSettings(
             weights=weights, likeness=likeness, neighbours=neighbours, roll=roll
         ),
+        basis=CostBasis(normalise=normalise, planning_time=planning_time),
         list_format=ListFormat(name=format_name, frame=frame),
         pick=PickOptions(rolls=rolls, repeats=repeats, seed=seed, overrides=overrides),
         top=top,

@@ -9,6 +9,7 @@ import numpy as np
 
 from reachmap.cell.model.orientations import ConeFamily
 from reachmap.geometry import quaternion_wxyz_from_rotation, yaw_transform
+from reachmap.maps.parts import Effort
 from reachmap.maps.records import BinMap, PathStore, Provenance, Stamp, Status
 from reachmap.sampling.orientations import orientation_set
 
@@ -91,6 +92,10 @@ def make_bin_map(
         "goal_configuration": np.where(can[..., None], np.zeros(6), np.nan),
         "path_reachability": 100.0 * can.mean(axis=-1),
         "scan_configuration": np.zeros(6),
+        "effort": Effort(
+            checks=np.where(found, rng.integers(1, 4000, found.shape), 0),
+            seconds_per_check=2e-5,
+        ),
         "joint_names": tuple(f"joint_{i}" for i in range(6)),
         "body_pairs": BODY_PAIRS,
         "paths": PathStore(

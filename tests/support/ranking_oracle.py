@@ -75,9 +75,16 @@ def mean(values: Any, found: Any) -> float:
 class Oracle:
     """The look-up table as nested loops would build it."""
 
-    def __init__(self, bin_map: Any) -> None:
+    def __init__(self, bin_map: Any, normalise: str = "quantile") -> None:
+        self.normalise = normalise
         self.bin_map = bin_map
         self.axis = bin_map.approach_axis
+        effort = bin_map.effort
+        self.planning = (
+            bin_map.planning_cpu_time
+            if effort is None
+            else effort.checks * effort.seconds_per_check
+        )
         self.grasps: list[dict[str, Any]] = []
         nl, ny, nx, no = bin_map.status.shape
         for i_layer in range(nl):
@@ -87,9 +94,19 @@ class Oracle:
                         self.grasps.append(self._test_grasp(i_layer, i_y, i_x, i_o))
         reached = [g for g in self.grasps if g["reachable"]]
         for name in ("length", "planning", "execution"):
-            greatest = max((g[name] for g in reached), default=0.0)
+            greatest = self._scale([g[name] for g in reached])
             for g in self.grasps:
                 g["norm_" + name] = g[name] / greatest if g["reachable"] else INFINITE
+
+    def _scale(self, values: list[float]) -> float:
+        """The maximum, or the 95 % quantile by linear interpolation between ranks."""
+        if self.normalise == "max" or not values:
+            return max(values, default=0.0)
+        ordered = sorted(values)
+        place = 0.95 * (len(ordered) - 1)
+        low = int(place)
+        high = min(low + 1, len(ordered) - 1)
+        return ordered[low] + (place - low) * (ordered[high] - ordered[low])
 
     def _test_grasp(self, *at: int) -> dict[str, Any]:
         m = self.bin_map
@@ -102,7 +119,7 @@ class Oracle:
             "v": column(R, self.axis),
             "reachable": any(found),
             "length": mean(m.path_length[at], found),
-            "planning": mean(m.planning_cpu_time[at], found),
+            "planning": mean(self.planning[at], found),
             "execution": mean(m.execution_time[at], found),
         }
 

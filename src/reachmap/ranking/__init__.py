@@ -24,10 +24,11 @@ from reachmap.ranking.lists.reading import grasps_from_document, read_grasps
 from reachmap.ranking.lookup.approach import align, rotation_between
 from reachmap.ranking.lookup.order import OUTSIDE_MAP, Ranking
 from reachmap.ranking.lookup.ranker import Ranker
-from reachmap.ranking.lookup.settings import RankSettings
+from reachmap.ranking.lookup.settings import CostBasis, RankSettings
 
 __all__ = [
     "OUTSIDE_MAP",
+    "CostBasis",
     "GraspList",
     "RankSettings",
     "RankedList",

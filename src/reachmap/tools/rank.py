@@ -25,7 +25,7 @@ from reachmap.ranking.lists.arrays import GraspList
 from reachmap.ranking.lists.reading import STDIN, read_grasps
 from reachmap.ranking.lookup.order import OUTSIDE_MAP
 from reachmap.ranking.lookup.ranker import Ranker
-from reachmap.ranking.lookup.settings import RankSettings
+from reachmap.ranking.lookup.settings import CostBasis, RankSettings
 
 logger = logging.getLogger(__name__)
 
@@ -82,6 +82,7 @@ def rank(
     map_path: str | Path = "bin.h5",
     output: Path | None = None,
     settings: RankSettings | None = None,
+    basis: CostBasis | None = None,
     list_format: ListFormat | None = None,
     cell: str | None = None,
     overrides: Sequence[str] = (),
@@ -104,6 +105,7 @@ def rank(
         A file, or a folder for one file each; several lists in one file make a JSON
         list. Nothing is written by default.
     settings : RankSettings, optional
+    basis : CostBasis, optional
     list_format : ListFormat, optional
     cell, overrides : str, sequence of str
         A cell the map must have been made for.
@@ -132,7 +134,7 @@ def rank(
     bin_map = read_bin_map(Path(map_path))
     if cell is not None:
         _check_cell(bin_map, map_path, cell, overrides, force=force)
-    ranker = Ranker(bin_map)
+    ranker = ranker_of(bin_map, map_path, basis)
     ranked = [_rank_one(grasps, ranker, settings, list_format) for grasps in lists]
     story = ""
     if explain is not None:
@@ -163,6 +165,21 @@ def _check_request(
     for name, value in (("top", top), ("chart-top", chart_top)):
         if value is not None and value < 1:
             raise SettingsError(f"{name} must be 1 or more (got {value})")
+
+
+def ranker_of(bin_map: BinMap, map_path: str | Path, basis: CostBasis | None) -> Ranker:
+    """Make a ranker; what it cannot take from the map as asked is logged."""
+    basis = basis or CostBasis()
+    ranker = Ranker(bin_map, basis)
+    if ranker.table.basis != basis:
+        logger.warning(
+            "%s: has no counts of state checks (format %s), so that planning times are "
+            "those measured, which differ from run to run; scan again for a lasting "
+            "order",
+            map_path,
+            bin_map.stamp.format_version,
+        )
+    return ranker
 
 
 def _check_cell(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -17,11 +18,11 @@ from reachmap.ranking.answers.pipeline import pose_from_numbers, rank_list
 from reachmap.ranking.answers.ranked_list import RankedList
 from reachmap.ranking.lists.reading import STDIN
 from reachmap.ranking.lookup.ranker import Ranker
-from reachmap.ranking.lookup.settings import RankSettings
+from reachmap.ranking.lookup.settings import CostBasis, RankSettings
 from reachmap.runtime.progress import Progress
 from reachmap.tools.options import IN_PROCESS, RunOptions, cell_of_artefact
 from reachmap.tools.prologue import refuse_cell_files
-from reachmap.tools.rank import ListFormat, read_list
+from reachmap.tools.rank import ListFormat, ranker_of, read_list
 from reachmap.validation.facts import facts_of
 from reachmap.validation.judgement import judge_list
 from reachmap.validation.picks import NO_PICKS, join_picks, picks_of
@@ -76,6 +77,7 @@ def validate(
     *,
     random: int | None = None,
     settings: RankSettings | None = None,
+    basis: CostBasis | None = None,
     list_format: ListFormat | None = None,
     pick: PickOptions | None = None,
     top: int = 10,
@@ -94,6 +96,7 @@ def validate(
     random : int, optional
         So many grasps drawn from the mapped volume, as a list of their own.
     settings : RankSettings, optional
+    basis : CostBasis, optional
     list_format : ListFormat, optional
     pick : PickOptions, optional
     top : int
@@ -115,7 +118,7 @@ def validate(
     check_picture(chart, "--chart")
     check_outputs([output, chart], overwrite=run.overwrite, inputs=[map_path, *sources])
     bin_map = read_bin_map(Path(map_path))
-    ranker = Ranker(bin_map)
+    ranker = ranker_of(bin_map, map_path, basis)
     context = _context(bin_map, str(map_path), pick)
     refuse_cell_files([output, chart], context.loaded)
     ranked = [
@@ -144,7 +147,10 @@ def validate(
             )
         ],
         top=top,
-        settings=_facts_of_settings(map_path, bin_map, settings, context, top),
+        settings={
+            **_facts_of_settings(map_path, bin_map, settings, context, top),
+            **dataclasses.asdict(ranker.table.basis),
+        },
     )
     _write(validation, output, chart, scene.checker.body_pairs, run.overwrite)
     return ValidateAnswer(

@@ -41,7 +41,7 @@ class JudgedList:
     measured : array, shape (n, 7)
         Mean over the successful attempts; NaN without any.
     terms : array, shape (n, 3)
-        Measured summands of J: weighted, normalised with the map's maxima.
+        Measured summands of J: weighted, normalised as the map's.
     halves : array, shape (n, 2)
         Measured J of every other attempt, and of those between.
     orders : mapping of str to int array
@@ -100,8 +100,9 @@ def judge_list(
     """Put what planning found beside what the map predicted."""
     ranking = ranked.ranking
     weights = np.asarray(ranked.settings["weights"], float)
-    scale = weights / np.where(ranker.table.maxima > 0, ranker.table.maxima, 1.0)
-    attempts = results.measured[..., IN_COST] @ scale
+    scale = weights / ranker.table.scale
+    costs = _costs(bin_map, ranker, results)
+    attempts = costs @ scale
     mean = _mean_of_successes(results.measured)
     outside = ranking.status == OUTSIDE_MAP
     with_ik = _with_ik(ranked, ranker, bin_map) & ~outside
@@ -115,7 +116,7 @@ def judge_list(
         outside=outside,
         results=results,
         measured=mean,
-        terms=mean[:, IN_COST] * scale,
+        terms=_mean_of_successes(costs) * scale,
         halves=np.stack(
             [_mean_of_successes(attempts[:, k::2, None])[:, 0] for k in (0, 1)], axis=1
         ),
@@ -125,6 +126,16 @@ def judge_list(
             "ik-only": np.argsort(~with_ik, kind="stable"),
         },
     )
+
+
+def _costs(bin_map: BinMap, ranker: Ranker, results: PickResults) -> FloatArray:
+    """What J is made of, attempt by attempt, shape (n, r, 3); NaN without a path."""
+    costs = results.measured[..., IN_COST].copy()
+    if ranker.table.basis.planning_time == "checks" and bin_map.effort is not None:
+        # In the unit of the map: a nominal cost per check, not this machine's.
+        seconds = results.checks * bin_map.effort.seconds_per_check
+        costs[..., 1] = np.where(np.isnan(costs[..., 0]), np.nan, seconds)
+    return costs
 
 
 def _mean_of_successes(values: FloatArray) -> FloatArray:

@@ -62,15 +62,21 @@ def rank_list(
 
 
 def _header(ranker: Ranker, settings: RankSettings) -> Mapping[str, Any]:
-    maxima = dict(zip(TERMS, ranker.table.maxima.tolist(), strict=True))
+    table = ranker.table
+    maxima = dict(zip(TERMS, table.maxima.tolist(), strict=True))
+    scale = dict(zip(TERMS, table.scale.tolist(), strict=True))
     return {
         "version": __version__,
         "map_sha256": ranker.stamp.content_sha256,
+        "cost_table_sha256": ranker.cost_table_sha256,
         "cell_sha256": ranker.stamp.cell_sha256,
         "weights": list(settings.weights),
         "likeness": settings.likeness,
         "neighbours": settings.neighbours,
         "roll": settings.roll,
+        "normalise": table.basis.normalise,
+        "planning_time": table.basis.planning_time,
+        "scale": scale,
         "maxima": maxima,
     }
 

@@ -1,8 +1,8 @@
 """The cost J: terms of the test grasp, blending, likeness, and where it is undefined.
 
 J = α φ3 + β φ4 + δ φ5 + ε φ6, with φ3, φ4, φ5 the mean path length, planning time and
-execution time of the test grasp, each divided by its maximum over the path-reachable
-test grasps of the map, and φ6 how unlike its test grasp the grasp is.
+execution time of the test grasp, each divided by a high quantile (or the maximum) over
+the path-reachable test grasps of the map, and φ6 how unlike its test grasp a grasp is.
 """
 
 from __future__ import annotations
@@ -91,8 +91,8 @@ def blended_terms(
     """φ3, φ4, φ5 blended over the k nearest test points by inverse distance.
 
     Whether a grasp is reachable is still decided by its nearest test grasp alone. An
-    unreachable neighbour counts with the greatest cost there is, 1 in each term: were
-    it left out, a grasp would become cheaper when a neighbour is lost.
+    unreachable neighbour counts with the greatest cost there is in each term: were it
+    left out, a grasp would become cheaper when a neighbour is lost.
 
     Parameters
     ----------
@@ -119,7 +119,7 @@ def blended_terms(
         used += other
         near = match_at(queries, table, point[:, column], distance[:, column], worth)
         terms = table.normalised[near.point, near.orientation]
-        terms = np.where(np.isnan(terms), 1.0, terms)
+        terms = np.where(np.isnan(terms), table.maxima / table.scale, terms)
         weight = np.where(other, 1.0 / np.maximum(near.distance, MIN_DISTANCE_M), 0.0)
         total += weight
         blend += terms * weight[:, None]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -26,7 +27,7 @@ from reachmap.ranking.lookup.matching import (
 )
 from reachmap.ranking.lookup.order import OUTSIDE_MAP, Ranking, stable_order
 from reachmap.ranking.lookup.queries import queries_from_arrays
-from reachmap.ranking.lookup.settings import RankSettings, Roll
+from reachmap.ranking.lookup.settings import CostBasis, RankSettings, Roll
 from reachmap.ranking.lookup.table import GraspTable, table_from_bin_map
 
 
@@ -39,6 +40,8 @@ class Ranker:
     Parameters
     ----------
     bin_map : BinMap
+    basis : CostBasis, optional
+        What the terms of J are made of.
 
     Attributes
     ----------
@@ -50,14 +53,19 @@ class Ranker:
         Identity of the map.
     """
 
-    def __init__(self, bin_map: BinMap) -> None:
-        self.table: GraspTable = table_from_bin_map(bin_map)
+    def __init__(self, bin_map: BinMap, basis: CostBasis | None = None) -> None:
+        self.table: GraspTable = table_from_bin_map(bin_map, basis)
         self.frames: Mapping[str, FloatArray] = frames_of(bin_map)
         self.stamp: Stamp = bin_map.stamp
         self._tree = NearestPoints(self.table.points)
 
+    @cached_property
+    def cost_table_sha256(self) -> str:
+        """Hash of what costs are looked up in; see :meth:`GraspTable.sha256`."""
+        return self.table.sha256()
+
     @classmethod
-    def from_map(cls, path: str | Path) -> Ranker:
+    def from_map(cls, path: str | Path, basis: CostBasis | None = None) -> Ranker:
         """Load a bin map.
 
         Raises
@@ -65,7 +73,7 @@ class Ranker:
         MapFileError
             The file is not a readable bin map.
         """
-        return cls(read_bin_map(Path(path)))
+        return cls(read_bin_map(Path(path)), basis)
 
     def rank(
         self,

@@ -9,10 +9,47 @@ from typing import Final, Literal, TypeAlias
 
 from reachmap.errors import SettingsError
 
+Normaliser: TypeAlias = Literal["quantile", "max"]
+NORMALISERS: Final[tuple[Normaliser, ...]] = ("quantile", "max")
+PlanningTime: TypeAlias = Literal["checks", "measured"]
+PLANNING_TIMES: Final[tuple[PlanningTime, ...]] = ("checks", "measured")
+# Of 0.9, 0.95, 0.99 and 1, chosen on simulated heaps: docs/reference/conventions.md.
+QUANTILE: Final = 0.95
 Roll: TypeAlias = Literal["as-given", "free", "fixed"]
 ROLLS: Final[tuple[Roll, ...]] = ("as-given", "free", "fixed")
 MAX_WEIGHT: Final = 1e6
 MAX_NEIGHBOURS: Final = 64
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CostBasis:
+    """What the terms of J are made of; it belongs to the table, not to one question.
+
+    Attributes
+    ----------
+    normalise : {"quantile", "max"}
+        What each mean is divided by: its 95 % quantile over the path-reachable test
+        grasps, so that no single one sets the scale, or its maximum, as in the paper.
+    planning_time : {"checks", "measured"}
+        State checks at a nominal cost each, which depend on the map alone, or the CPU
+        time that was measured, as in the paper. A map without counts of checks has
+        measured times only.
+    """
+
+    normalise: Normaliser = "quantile"
+    planning_time: PlanningTime = "checks"
+
+    def __post_init__(self) -> None:
+        mistakes = [
+            f"{name} must be one of {', '.join(known)} (got {value!r})"
+            for name, value, known in (
+                ("normalise", self.normalise, NORMALISERS),
+                ("planning time", self.planning_time, PLANNING_TIMES),
+            )
+            if value not in known
+        ]
+        if mistakes:
+            raise SettingsError(mistakes)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import hashlib
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -14,8 +15,10 @@ from reachmap.geometry import (
     inverse_transform,
     rotation_from_quaternion_wxyz,
 )
+from reachmap.maps.bytes.hashing import canonical_array
 from reachmap.maps.records import BinMap, Status, freeze
 from reachmap.ranking.lookup.approach import axis_vector
+from reachmap.ranking.lookup.settings import QUANTILE, CostBasis
 
 TERMS: Final = ("path_length", "planning_time", "execution_time")
 SAME_AXIS_RAD: Final = 1e-6
@@ -38,16 +41,21 @@ class GraspTable:
     axes : array, shape (n, m, 3)
         Approach directions in robot_base.
     status : uint8 array, shape (n, m)
-        Codes of :class:`Status`. ``path_found`` here means that an attempt found one.
+        Codes of :class:`Status`. ``path_found`` here means that a path is stored.
     blocking_pair : int array, shape (n, m)
     reachable : bool array, shape (n, m)
     means : array, shape (n, m, 3)
         Mean path length [rad], planning time and execution time [s] over the
-        successful attempts; NaN where none was.
+        successful attempts; where none was, of the roadmap's own path; NaN where there
+        is no path.
     maxima : array, shape (3,)
         Greatest of each mean over the path-reachable test grasps.
+    scale : array, shape (3,)
+        What each mean is divided by; 1 where the mean is zero everywhere.
     normalised : array, shape (n, m, 3)
-        φ3, φ4, φ5 in [0, 1]; NaN where unreachable.
+        φ3, φ4, φ5: means over scale; NaN where unreachable.
+    basis : CostBasis
+        With the planning time that was used, whatever was asked for.
     same_everywhere : bool
         Whether every point has the same orientations, as families give them.
     layers : array, shape (nl,)
@@ -72,7 +80,9 @@ class GraspTable:
     reachable: BoolArray
     means: FloatArray
     maxima: FloatArray
+    scale: FloatArray
     normalised: FloatArray
+    basis: CostBasis
     same_everywhere: bool
     layers: FloatArray
     bin_points: FloatArray
@@ -85,13 +95,27 @@ class GraspTable:
     def __post_init__(self) -> None:
         freeze(self)
 
+    def sha256(self) -> str:
+        """Hash of the costs: equal hashes rank every list alike."""
+        digest = hashlib.sha256()
+        for values in (
+            self.points,
+            self.quaternions,
+            self.status,
+            self.reachable,
+            self.normalised,
+        ):
+            digest.update(canonical_array(values).tobytes())
+        return digest.hexdigest()
 
-def table_from_bin_map(bin_map: BinMap) -> GraspTable:
+
+def table_from_bin_map(bin_map: BinMap, basis: CostBasis | None = None) -> GraspTable:
     """Arrange a bin map for ranking.
 
     Parameters
     ----------
     bin_map : BinMap
+    basis : CostBasis, optional
 
     Raises
     ------
@@ -106,10 +130,11 @@ def table_from_bin_map(bin_map: BinMap) -> GraspTable:
     quaternions = _unit_quaternions(bin_map.quaternion_wxyz.reshape(n, no, 4))
     if not (np.isfinite(points).all() and np.isfinite(bin_map.bin_pose).all()):
         raise MapFileError("the bin map has poses that are not finite")
-    found = bin_map.path_found.reshape(n, no, -1) > 0
-    reachable: BoolArray = np.any(found, axis=-1)
-    means = _means(bin_map, found)
+    basis = _possible(basis or CostBasis(), bin_map)
+    means = _means(bin_map, basis).reshape(n, no, 3)
+    reachable: BoolArray = np.isfinite(means[..., 0])
     maxima = np.max(means, axis=(0, 1), where=reachable[..., None], initial=0.0)
+    scale = _scale(means[reachable], maxima, basis)
     R = rotation_from_quaternion_wxyz(quaternions)
     axes = R @ axis_vector(bin_map.approach_axis)
     T_bin_base = inverse_transform(bin_map.bin_pose)
@@ -123,8 +148,9 @@ def table_from_bin_map(bin_map: BinMap) -> GraspTable:
         reachable=reachable,
         means=means,
         maxima=maxima,
-        # A term that is zero everywhere costs nothing rather than 0/0.
-        normalised=means / np.where(maxima > 0, maxima, 1.0),
+        scale=scale,
+        normalised=means / scale,
+        basis=basis,
         same_everywhere=bool(
             (quaternion_angle(quaternions, quaternions[0]) < 1e-9).all()
         ),
@@ -145,22 +171,67 @@ def _unit_quaternions(quaternions: FloatArray) -> FloatArray:
     return np.asarray(quaternions / norm)
 
 
-def _means(bin_map: BinMap, found: BoolArray) -> FloatArray:
-    """Means over successful attempts, shape (n, m, 3); NaN where there is none."""
-    values = (bin_map.path_length, bin_map.planning_cpu_time, bin_map.execution_time)
-    stacked = np.stack([value.reshape(found.shape) for value in values], axis=-1)
+def _possible(basis: CostBasis, bin_map: BinMap) -> CostBasis:
+    """The basis, with measured times where the map has no counts of checks."""
+    if bin_map.effort is None and basis.planning_time == "checks":
+        return replace(basis, planning_time="measured")
+    return basis
+
+
+def _means(bin_map: BinMap, basis: CostBasis) -> FloatArray:
+    """Means over successful attempts, shape (..., 3); NaN where there is no path."""
+    found = bin_map.path_found > 0
+    values = (
+        bin_map.path_length,
+        planning_time_of(bin_map, basis),
+        bin_map.execution_time,
+    )
+    stacked = np.stack(values, axis=-1)
     count = found.sum(axis=-1)[..., None]
     total = np.where(found[..., None], stacked, 0.0).sum(axis=-2)
     if not np.isfinite(total).all():
         raise MapFileError("the bin map has a path without length or times")
-    return np.where(count > 0, total / np.maximum(count, 1), np.nan)
+    means = np.where(count > 0, total / np.maximum(count, 1), np.nan)
+    return np.where(count > 0, means, _of_best_paths(bin_map))
+
+
+def planning_time_of(bin_map: BinMap, basis: CostBasis) -> FloatArray:
+    """Planning time of each attempt as a basis has it [s], shape of ``path_found``."""
+    if bin_map.effort is None or basis.planning_time == "measured":
+        return bin_map.planning_cpu_time
+    return bin_map.effort.checks * bin_map.effort.seconds_per_check
+
+
+def _of_best_paths(bin_map: BinMap) -> FloatArray:
+    """What the best paths take, shape (..., 3).
+
+    The roadmap's own path took no planner; its checks stand for its time, measured
+    times or not.
+    """
+    best, effort = bin_map.best, bin_map.effort
+    if best is None or effort is None:
+        return np.full((*bin_map.status.shape, 3), np.nan)
+    planning = best.effort_checks * effort.seconds_per_check
+    values = np.stack([best.path_length, planning, best.execution_time], axis=-1)
+    return np.where(best.row[..., None] >= 0, values, np.nan)
+
+
+def _scale(means: FloatArray, maxima: FloatArray, basis: CostBasis) -> FloatArray:
+    """What the means (reachable, 3) are divided by, shape (3,)."""
+    scale: FloatArray = maxima
+    if basis.normalise == "quantile" and len(means):
+        quantile = np.quantile(means, QUANTILE, axis=0)
+        # Where nearly all are zero, the quantile says nothing.
+        scale = np.where(quantile > 0, quantile, maxima)
+    # A term that is zero everywhere costs nothing rather than 0/0.
+    return np.asarray(np.where(scale > 0, scale, 1.0), float)
 
 
 def _status(status: CodeArray, reachable: BoolArray) -> CodeArray:
-    """Status as ranking sees it: of the attempts, not of the roadmap.
+    """Status as ranking sees it: where a path is stored.
 
-    A test grasp that the roadmap proves reachable but that no attempt reached has no
-    cost; for a picking loop, which runs the planner, it is ``no_path_found``.
+    In maps of version 1.0 the roadmap proves some test grasps reachable whose path is
+    not stored; they have no cost, and are ``no_path_found`` for a picking loop.
     """
     unmeasured = (status == Status.PATH_FOUND) & ~reachable
     seen = np.where(unmeasured, Status.NO_PATH_FOUND, status)
