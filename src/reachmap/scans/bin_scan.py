@@ -14,12 +14,18 @@ from reachmap.cell.model.cell import Cell
 from reachmap.core.planning.planner import PlanResult
 from reachmap.core.scene import Scene
 from reachmap.maps import BinMap, PathStore, RunInfo, Stamp, Status, write_bin_map
+from reachmap.maps.parts import ApproachTimes, Effort
 from reachmap.maps.records import freeze
 from reachmap.runtime.work import Kind, Work
 from reachmap.sampling.frames import bin_test_frames
 from reachmap.scans.document import journal_settings, provenance_from_document
 from reachmap.scans.ik_survey import Survey
-from reachmap.scans.measured import MEASURED, Meter, attempt_seed
+from reachmap.scans.measured import (
+    MEASURED,
+    SECONDS_PER_CHECK,
+    Meter,
+    attempt_seed,
+)
 
 if TYPE_CHECKING:
     from reachmap.cell.loading import LoadedCell
@@ -34,7 +40,9 @@ class GraspResults:
     status, n_ik, n_ik_free, connected : uint8 array, shape (grasps,)
     blocking_pair : int array, shape (grasps,)
     path_found, hit_time_limit : uint8 array, shape (grasps, repeats)
-    measured : array, shape (grasps, repeats, 7)
+    checks : int array, shape (grasps, repeats)
+        State checks of the search.
+    measured : array, shape (grasps, repeats, 9)
         In the order of :data:`~reachmap.scans.measured.MEASURED`.
     goal_configuration : array, shape (grasps, dof)
         Where the shortest path ends [rad].
@@ -52,6 +60,7 @@ class GraspResults:
     blocking_pair: IntArray
     path_found: CodeArray
     hit_time_limit: CodeArray
+    checks: IntArray
     measured: FloatArray
     goal_configuration: FloatArray
     configuration: FloatArray
@@ -73,6 +82,7 @@ class GraspResults:
             blocking_pair=np.full(grasps, -1, np.int64),
             path_found=np.zeros((grasps, repeats), np.uint8),
             hit_time_limit=np.zeros((grasps, repeats), np.uint8),
+            checks=np.zeros((grasps, repeats), np.int64),
             measured=np.full((grasps, repeats, len(MEASURED)), np.nan),
             goal_configuration=np.full((grasps, dof), np.nan),
             configuration=np.zeros((0, dof)),
@@ -127,6 +137,9 @@ def assemble_bin_map(
     measured = {
         name: shaped(results.measured[..., k]) for k, name in enumerate(MEASURED)
     }
+    times = ApproachTimes(
+        approach=measured.pop("approach_time"), retreat=measured.pop("retreat_time")
+    )
     return BinMap(
         layer=grid.layer,
         y=grid.y,
@@ -145,6 +158,10 @@ def assemble_bin_map(
         path_found=shaped(results.path_found),
         hit_time_limit=shaped(results.hit_time_limit),
         **measured,
+        times=times,
+        effort=Effort(
+            checks=shaped(results.checks), seconds_per_check=SECONDS_PER_CHECK
+        ),
         goal_configuration=shaped(results.goal_configuration),
         path_reachability=percent,
         scan_configuration=np.array(document["scan_configuration"], float),
@@ -282,12 +299,14 @@ def _results(
     goals = survey.goals_of(grasp)
     measured = np.full((1, repeats, len(MEASURED)), np.nan)
     out_of_time = np.zeros((1, repeats), np.uint8)
+    checks = np.zeros((1, repeats), np.int64)
     paths: list[FloatArray] = []
     planned: list[int] = []
     place: list[tuple[int, int]] = []
     meter = Meter(scene)
     for repeat, plan in enumerate(plans):
         out_of_time[0, repeat] = plan.hit_time_limit
+        checks[0, repeat] = plan.checks
         if plan.path is None:
             continue
         way = survey.way_of(int(goals[plan.goal]))
@@ -303,6 +322,7 @@ def _results(
         blocking_pair=survey.blocking_pair[[grasp]],
         path_found=np.isfinite(measured[..., 0]).astype(np.uint8),
         hit_time_limit=out_of_time,
+        checks=checks,
         measured=measured,
         goal_configuration=_shortest_goal(paths, measured, scene.robot.dof),
         configuration=np.vstack([np.zeros((0, scene.robot.dof)), *paths]),

@@ -11,7 +11,7 @@ from reachmap._typing import FloatArray
 from reachmap.core.planning.timing import (
     merge_straight,
     segment_times_s,
-    straight_way_time_s,
+    smooth_way_time_s,
 )
 from reachmap.core.robot.model import RobotModel
 from reachmap.errors import SettingsError
@@ -71,7 +71,7 @@ def playback_of(record: BinMap, row: int, robot: RobotModel) -> Playback:
     planned, approach = way_points(record, row)
     corners = merge_straight(planned) if len(planned) > 1 else planned
     times = segment_times_s(corners, *limits) if len(corners) > 1 else np.zeros(0)
-    way_s = straight_way_time_s(approach, *limits)
+    way_s = smooth_way_time_s(approach, *limits)
     parts = [
         _eased(np.stack([a, b]), float(time), *limits)
         for a, b, time in zip(corners[:-1], corners[1:], times, strict=True)

@@ -151,7 +151,12 @@ BIN = Layout(
         _measured("planning_time", "s", "Wall-clock time of the planner"),
         _measured("planning_cpu_time", "s", "CPU time of the planning thread"),
         _measured("simplification_time", "s", "CPU time of shortening the path"),
-        _measured("execution_time", "s", "Time optimum of the whole path"),
+        _measured(
+            "execution_time",
+            "s",
+            "Time optimum of the planned part and of the straight approach, at rest "
+            "between them",
+        ),
         goal("", _GRASP, " on the shortest path"),
         index("paths/path", "Stored paths."),
         index("paths/point", "Way-points of all stored paths."),
