@@ -183,7 +183,7 @@ def _means(bin_map: BinMap, basis: CostBasis) -> FloatArray:
     found = bin_map.path_found > 0
     values = (
         bin_map.path_length,
-        planning_time_of(bin_map, basis),
+        _planning_time(bin_map, basis),
         bin_map.execution_time,
     )
     stacked = np.stack(values, axis=-1)
@@ -195,11 +195,11 @@ def _means(bin_map: BinMap, basis: CostBasis) -> FloatArray:
     return np.where(count > 0, means, _of_best_paths(bin_map))
 
 
-def planning_time_of(bin_map: BinMap, basis: CostBasis) -> FloatArray:
+def _planning_time(bin_map: BinMap, basis: CostBasis) -> FloatArray:
     """Planning time of each attempt as a basis has it [s], shape of ``path_found``."""
     if bin_map.effort is None or basis.planning_time == "measured":
         return bin_map.planning_cpu_time
-    return bin_map.effort.checks * bin_map.effort.seconds_per_check
+    return np.asarray(bin_map.effort.checks * bin_map.effort.seconds_per_check)
 
 
 def _of_best_paths(bin_map: BinMap) -> FloatArray:
