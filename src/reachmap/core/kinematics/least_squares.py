@@ -41,6 +41,7 @@ def least_squares_many(
     tolerance: float,
     iterations: int,
     patience: int = 15,
+    limits: tuple[FloatArray, FloatArray] | None = None,
 ) -> tuple[FloatArray, FloatArray]:
     """Move configurations so that the TCP meets its goal.
 
@@ -57,6 +58,8 @@ def least_squares_many(
         Steps at most.
     patience : int
         A row that has not become ten times better in so many steps is given up.
+    limits : tuple of array, shape (dof,), optional
+        Lower and upper limits that steps do not leave.
 
     Returns
     -------
@@ -67,11 +70,18 @@ def least_squares_many(
     """
     best, residual = np.empty_like(Q), np.empty(len(Q), Q.dtype)
     arm = ChainArrays.of(chain)
+    bounds = None if limits is None else (limits[0][:, None], limits[1][:, None])
     for start in range(0, len(Q), _BLOCK):
         rows = slice(start, start + _BLOCK)
         goals = np.moveaxis(T_goal[rows, :3], 0, -1).astype(Q.dtype, order="C")
         q, residual[rows] = _refine(
-            arm, np.ascontiguousarray(Q[rows].T), goals, tolerance, iterations, patience
+            arm,
+            np.ascontiguousarray(Q[rows].T),
+            goals,
+            tolerance,
+            iterations,
+            patience,
+            bounds,
         )
         best[rows] = q.T
     return best, residual
@@ -84,6 +94,7 @@ def _refine(
     tolerance: float,
     iterations: int,
     patience: int,
+    bounds: tuple[FloatArray, FloatArray] | None,
 ) -> tuple[FloatArray, FloatArray]:
     """Refine a block: q (dof, n), goals (3, 4, n)."""
     best, residual = q.copy(), np.full(q.shape[1], np.inf, q.dtype)
@@ -101,8 +112,14 @@ def _refine(
         if count == iterations or not going.any():
             break
         dq = _damped_step(J, error)
+        if bounds is not None:
+            # Joints that would leave their limits stay; the others do what they can.
+            stays = ((q <= bounds[0]) & (dq < 0)) | ((q >= bounds[1]) & (dq > 0))
+            dq = np.where(stays, 0.0, _damped_step(np.where(stays, 0.0, J), error))
         longest = np.maximum(np.abs(dq).max(axis=0), _LARGEST_STEP)
         q = q + dq * (_LARGEST_STEP / longest)
+        if bounds is not None:
+            q = np.clip(q, *bounds)
         if not going.all():
             active, q, goals = active[going], q[:, going], goals[:, :, going]
     return best, residual

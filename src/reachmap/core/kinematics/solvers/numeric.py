@@ -10,7 +10,14 @@ import numpy as np
 from reachmap._typing import BoolArray, FloatArray, IntArray
 from reachmap.core.kinematics.least_squares import least_squares_many
 from reachmap.core.kinematics.seeds import SeedTable, spread_points
-from reachmap.core.kinematics.solutions import Rows, distinct, joined, wrapped
+from reachmap.core.kinematics.solutions import (
+    Rows,
+    can_be_within,
+    distinct,
+    joined,
+    turned_into,
+    wrapped,
+)
 from reachmap.core.kinematics.solvers.arm import Arm, Way
 
 # Rows of the table of starts that are looked at, per start that is asked for: a third
@@ -30,6 +37,10 @@ _HOPELESS = 0.4
 # Other starts lead to the solutions of rows that take longer.
 _LAST_STEPS = 30
 _PATIENCE = 4
+
+# Poses that are nearly met, or met outside the limits only, get so many times the
+# starts again, and steps that stay within the limits.
+_MORE = 4
 
 # Arms of so few joints need no table.
 _FEW_JOINTS = 2
@@ -52,7 +63,8 @@ class NumericSolver:
     complete = False
 
     def __init__(self, arm: Arm) -> None:
-        self._chain, self.tolerance = arm.chain, arm.tolerance
+        self._arm, self._chain = arm, arm.chain
+        self.tolerance = arm.tolerance
         middle, half = (arm.lower + arm.upper) / 2, (arm.upper - arm.lower) / 2
         half = np.where(arm.chain.is_revolute, np.minimum(half, np.pi), half)
         self._restarts = arm.spec.restarts
@@ -91,31 +103,60 @@ class NumericSolver:
         return joined(tables, self._chain.dof)
 
     def _block(self, T: FloatArray) -> Rows:
-        if self._table is None:
-            frame = np.repeat(np.arange(len(T)), len(self._starts))
-            Q = np.tile(self._starts, (len(T), 1))
-        else:
-            Q, frame = self._table.starts(T, self._count)
-            near, residual = least_squares_many(
-                self._chain,
-                Q.astype(np.float32),
-                T[frame],
-                tolerance=1e-5,
-                iterations=_FIRST_STEPS,
-            )
-            keep = _apart(wrapped(near, self._chain.is_revolute), frame, residual)
-            Q, frame = near[keep].astype(float), frame[keep]
+        rows, missed = self._round(T, self._count)
+        allowed = can_be_within(
+            rows[0], self._arm.lower, self._arm.upper, self._chain.is_revolute
+        )
+        hopeful = missed < _NEAR
+        hopeful[rows[1][allowed]] = False
+        again = np.flatnonzero(hopeful)
+        if self._table is None or not len(again):
+            return rows
+        (Q, frame), _ = self._round(T[again], _MORE * self._count, within=True)
+        return joined([rows, (Q, again[frame])], self._chain.dof)
+
+    def _round(
+        self, T: FloatArray, count: int, *, within: bool = False
+    ) -> tuple[Rows, FloatArray]:
+        """Solutions from so many starts, and the least miss of each pose.
+
+        With `within`, steps do not leave the limits.
+        """
+        Q, frame = self._near(T, count)
+        limits = None
+        if within:
+            limits = self._arm.lower, self._arm.upper
+            Q = turned_into(Q, *limits, self._chain.is_revolute)
         Q, residual = least_squares_many(
             self._chain,
             Q,
             T[frame],
             tolerance=1e-10,
             iterations=_LAST_STEPS,
-            patience=_PATIENCE if self._table else _LAST_STEPS,
+            patience=_LAST_STEPS if within or self._table is None else _PATIENCE,
+            limits=limits,
         )
+        missed = np.full(len(T), np.inf)
+        np.minimum.at(missed, frame, residual)
         good = residual <= self.tolerance
         rows = (wrapped(Q[good], self._chain.is_revolute), frame[good])
-        return distinct(rows, self._chain.is_revolute)
+        return distinct(rows, self._chain.is_revolute), missed
+
+    def _near(self, T: FloatArray, count: int) -> Rows:
+        """Starts, those of the table a few steps nearer to their poses."""
+        if self._table is None:
+            frame = np.repeat(np.arange(len(T)), len(self._starts))
+            return np.tile(self._starts, (len(T), 1)), frame
+        Q, frame = self._table.starts(T, count)
+        Q, residual = least_squares_many(
+            self._chain,
+            Q.astype(np.float32),
+            T[frame],
+            tolerance=1e-5,
+            iterations=_FIRST_STEPS,
+        )
+        keep = _apart(wrapped(Q, self._chain.is_revolute), frame, residual)
+        return Q[keep].astype(float), frame[keep]
 
 
 def _apart(Q: FloatArray, frame: IntArray, residual: FloatArray) -> BoolArray:

@@ -1,13 +1,14 @@
 """Inverse kinematics of redundant arms: joints on a grid, EAIK for the rest.
 
 The redundant joint is one of a seven-axis arm, or a rail or gantry that carries an
-arm. The solutions of a pose form curves; the grid takes points from them. A pose that
-has none on the grid may still be reachable: the method is not complete.
+arm. The solutions of a pose form curves; the grid takes points from them. For a pose
+that has none on the grid they are sought numerically: the method is not complete.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import cached_property
 from itertools import product
 
 import numpy as np
@@ -26,13 +27,10 @@ from reachmap.core.kinematics.solutions import (
     can_be_within,
     distinct,
     joined,
-    turned_into,
     wrapped,
 )
 from reachmap.core.kinematics.solvers.arm import FULL_AXES, Arm, Way
-
-# Rows per pose from which a solution is sought where the grid has none.
-_SEEDS = 8
+from reachmap.core.kinematics.solvers.numeric import NumericSolver
 
 # Rows of a nominal arm that miss by more [m or rad] are not worth steps.
 _NEAR_NOMINAL = 0.2
@@ -109,7 +107,10 @@ class RedundantSolver:
                 f"{self._arm.joint_names[k]} sampled at {len(np.unique(column))} "
                 f"values from {low} to {high} {unit}"
             )
-        return f"{', '.join(parts)}, the other joints in closed form"
+        return (
+            f"{', '.join(parts)}, the other joints in closed form; "
+            "least squares where that finds none"
+        )
 
     def branches(self, T: FloatArray) -> Rows:
         """Solutions that meet their poses, some turn of them within the limits.
@@ -133,23 +134,29 @@ class RedundantSolver:
         """
         rng = np.random.default_rng(0)
         Q = rng.uniform(self._lower, self._upper, (_POSES, self._chain.dof))
-        rows, _ = self._on_grid(self._chain.forward_many(Q))
-        return len(np.unique(rows[1])) / _POSES
+        _, frame = self._on_grid(self._chain.forward_many(Q))
+        return len(np.unique(frame)) / _POSES
 
     def _block(self, T: FloatArray) -> Rows:
-        rows, raw = self._on_grid(T)
-        counts = np.bincount(rows[1], minlength=len(T))
-        more = self._between_samples(raw, T, np.flatnonzero(counts == 0))
-        return joined([rows, more], self._chain.dof)
+        rows = self._on_grid(T)
+        missing = np.flatnonzero(np.bincount(rows[1], minlength=len(T)) == 0)
+        if not len(missing):
+            return rows
+        # Near the edge of reach the curves of solutions are shorter than the spacing.
+        Q, frame = self._allowed(self._between_samples.branches(T[missing]))
+        return joined([rows, (Q, missing[frame])], self._chain.dof)
 
-    def _on_grid(self, T: FloatArray) -> tuple[Rows, Rows]:
-        """Solutions, and the closed form's rows."""
+    @cached_property
+    def _between_samples(self) -> NumericSolver:
+        return NumericSolver(self._arm)
+
+    def _on_grid(self, T: FloatArray) -> Rows:
         tables = [
             self._rows(form, values, T)
             for form, values in zip(self._forms, self.values, strict=True)
         ]
-        raw = joined([self._allowed(table) for table in tables], self._chain.dof)
-        Q, frame = raw
+        allowed = [self._allowed(table) for table in tables]
+        Q, frame = joined(allowed, self._chain.dof)
         residual = matrix_difference(T[frame], self._chain.forward_many(Q))
         met = residual <= MET
         solved = [(Q[met], frame[met])]
@@ -157,7 +164,7 @@ class RedundantSolver:
             near = ~met & (residual <= _NEAR_NOMINAL)
             solved.append(self._polished(Q[near], frame[near], T))
         rows = joined(solved, self._chain.dof)
-        return distinct(rows, self._chain.is_revolute), raw
+        return distinct(rows, self._chain.is_revolute)
 
     def _rows(self, form: ClosedForm, values: tuple[float, ...], T: FloatArray) -> Rows:
         Q_others, frame = form.rows(T)
@@ -172,24 +179,6 @@ class RedundantSolver:
         )
         good = missed <= ACCEPTED
         return self._allowed((wrapped(Q[good], self._chain.is_revolute), frame[good]))
-
-    def _between_samples(self, raw: Rows, T: FloatArray, missing: IntArray) -> Rows:
-        """Solutions near the best rows of the grid, with the sampled joint free.
-
-        Near the edge of reach the curves of solutions are shorter than the grid's
-        spacing.
-        """
-        keep = np.isin(raw[1], missing)
-        frame = raw[1][keep]
-        Q = turned_into(raw[0][keep], self._lower, self._upper, self._chain.is_revolute)
-        residual = matrix_difference(T[frame], self._chain.forward_many(Q))
-        order = np.lexsort((residual, frame))
-        Q, frame = Q[order], frame[order]
-        counts = np.bincount(frame, minlength=len(T))
-        place = np.arange(len(Q)) - np.repeat(np.cumsum(counts) - counts, counts)
-        Q, frame = Q[place < _SEEDS], frame[place < _SEEDS]
-        rows = self._polished(Q, frame, T)
-        return distinct(rows, self._chain.is_revolute)
 
     def _allowed(self, rows: Rows) -> Rows:
         keep = can_be_within(rows[0], self._lower, self._upper, self._chain.is_revolute)
