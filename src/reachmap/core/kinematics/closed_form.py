@@ -16,7 +16,7 @@ from eaik.pybindings import EAIK
 
 from reachmap._typing import BoolArray, FloatArray
 from reachmap.core.kinematics.least_squares import least_squares_many
-from reachmap.core.kinematics.nominal import nominal_arms, rounded_arm
+from reachmap.core.kinematics.nominal import NOMINAL_ARMS, rounded_arm
 from reachmap.core.kinematics.refine import matrix_difference
 from reachmap.core.kinematics.solutions import Rows, angular_distance
 from reachmap.core.robot.chain import SerialChain
@@ -139,9 +139,7 @@ def find_closed_form(
     if not chain.is_revolute.all() or chain.dof > _AXES:
         return None
     best = None
-    for form in _candidates(chain):
-        if like is not None and form.kind != like.kind:
-            continue
+    for form in _candidates(chain, like):
         score = _count(form, chain, _TRIALS, tolerance)
         if score < _TRIALS - 2:
             continue
@@ -154,11 +152,14 @@ def find_closed_form(
     return best
 
 
-def _candidates(chain: SerialChain) -> Iterator[ClosedForm]:
+def _candidates(chain: SerialChain, like: ClosedForm | None) -> Iterator[ClosedForm]:
     """Forms that EAIK claims to know."""
     Q = np.random.default_rng(0).uniform(-np.pi, np.pi, (_TRIALS, chain.dof))
     poses = chain.forward_many(Q)
-    for kind, nominal in enumerate(nominal_arms(chain)):
+    for kind, way in enumerate(NOMINAL_ARMS):
+        nominal = way(chain) if like is None or kind == like.kind else None
+        if nominal is None:
+            continue
         apart = matrix_difference(poses, nominal.forward_many(Q)).max()
         for padded in _padded(nominal):
             rows = _rows(padded, chain.dof)
@@ -207,7 +208,7 @@ def _found_again(
     near = residual <= form.near
     found, frame = found[near], frame[near]
     found, residual = least_squares_many(
-        chain, found, T[frame], tolerance=1e-9, iterations=20
+        chain, found, T[frame], tolerance=1e-9, iterations=12, patience=6
     )
     apart = angular_distance(found - Q[frame], chain.is_revolute).max(axis=1)
     good = (residual < tolerance) & (apart < max(1e-5, _ROUNDED_APART * tolerance))

@@ -7,7 +7,7 @@ rotations by its last place.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable
 
 import numpy as np
 
@@ -35,20 +35,6 @@ _LARGEST_ROUNDING = 2e-4
 
 # Of the bound that random configurations give, for those that were not tried.
 _MARGIN = 1.5
-
-
-def nominal_arms(chain: SerialChain) -> Iterator[SerialChain]:
-    """Arms near a chain of revolute joints, the nearest, itself, first.
-
-    Of an arm of fewer than six axes whose angles are rounded, the poses that are asked
-    for are those of the arm with exact ones.
-    """
-    if chain.dof < _AXES and rounding(chain):
-        yield rounded_arm(chain)
-    yield chain
-    yield _snapped(chain, _LAST_PLACES, _LAST_PLACES)
-    yield _snapped(rounded_arm(chain), _LAST_PLACES, _LAST_PLACES)
-    yield _snapped(chain, _CALIBRATION_RAD, _CALIBRATION_M)
 
 
 def rounded_arm(chain: SerialChain) -> SerialChain:
@@ -86,6 +72,27 @@ def rounding(chain: SerialChain) -> float:
     return _MARGIN * float(apart) if is_rounded else 0.0
 
 
+def _of_few_axes(chain: SerialChain) -> SerialChain | None:
+    """Arm with exact angles, where the poses asked for are those of that arm."""
+    return rounded_arm(chain) if chain.dof < _AXES and rounding(chain) else None
+
+
+def _as_written(chain: SerialChain) -> SerialChain:
+    return chain
+
+
+def _of_last_places(chain: SerialChain) -> SerialChain:
+    return _snapped(chain, _LAST_PLACES, _LAST_PLACES)
+
+
+def _of_rounded_angles(chain: SerialChain) -> SerialChain:
+    return _snapped(rounded_arm(chain), _LAST_PLACES, _LAST_PLACES)
+
+
+def _of_calibration(chain: SerialChain) -> SerialChain:
+    return _snapped(chain, _CALIBRATION_RAD, _CALIBRATION_M)
+
+
 def _snapped(chain: SerialChain, parallel_rad: float, meeting_m: float) -> SerialChain:
     """Make nearly parallel axes parallel, and nearly meeting neighbours meet."""
     axes, points = chain.axes_base.T.copy(), chain.points_base
@@ -93,12 +100,9 @@ def _snapped(chain: SerialChain, parallel_rad: float, meeting_m: float) -> Seria
         # Any point of an axis describes it; calibration likes far ones.
         along = axes[k] @ (points[k - 1] - points[k])
         points[k] = points[k] + along * axes[k]
-        parallel = [
-            j
-            for j in range(k)
-            if np.linalg.norm(np.cross(axes[j], axes[k])) < parallel_rad
-        ]
-        if parallel:
+        across = np.linalg.norm(np.cross(axes[:k], axes[k]), axis=1)
+        parallel = np.flatnonzero(across < parallel_rad)
+        if len(parallel):
             reference = axes[parallel[0]]
             axes[k] = reference * np.sign(reference @ axes[k])
         if k - 1 in parallel:
@@ -124,3 +128,14 @@ def _meeting_point(
         # Three axes of a spherical wrist: the last meets where the two before do.
         return np.asarray(points[k - 1])
     return np.asarray(meeting)
+
+
+# Ways to the nominal arm of a chain of revolute joints, the nearest arm first; None
+# where a way is not for the chain.
+NOMINAL_ARMS: tuple[Callable[[SerialChain], SerialChain | None], ...] = (
+    _of_few_axes,
+    _as_written,
+    _of_last_places,
+    _of_rounded_angles,
+    _of_calibration,
+)

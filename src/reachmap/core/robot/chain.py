@@ -68,7 +68,7 @@ class SerialChain:
             placement = base.actInv(data.oMi[joint])
             axis = _axis_in_joint(model.joints[joint], model)
             axes.append(placement.rotation @ axis)
-            R = placement.rotation @ _frame_with_z(axis)
+            R = placement.rotation @ _frames_with_z(axis[None])[0]
             zero.append(transform_from_parts(R, placement.translation))
         zero.append(np.array(tcp.homogeneous))
         T = np.array(zero)
@@ -99,7 +99,7 @@ class SerialChain:
         T_base_tcp_zero : array, shape (4, 4)
         is_revolute : array of bool, shape (dof,)
         """
-        R = np.array([_frame_with_z(axis) for axis in axes]).reshape(-1, 3, 3)
+        R = _frames_with_z(np.asarray(axes, float))
         T = np.concatenate([np.eye(4)[None], transform_from_parts(R, points)])
         T = np.concatenate([T, T_base_tcp_zero[None]])
         return cls(
@@ -167,7 +167,7 @@ class SerialChain:
     def joint_rotations(model: Any) -> FloatArray:
         """Each joint frame of this chain in Pinocchio's joint frame, (dof, 3, 3)."""
         axes = [_axis_in_joint(joint, model) for joint in list(model.joints)[1:]]
-        return np.array([_frame_with_z(axis) for axis in axes])
+        return _frames_with_z(np.array(axes))
 
     def jacobian_many(self, Q: FloatArray) -> tuple[FloatArray, FloatArray]:
         """TCP poses and geometric Jacobians in robot_base.
@@ -275,10 +275,9 @@ def _axis_in_joint(joint: object, model: object) -> FloatArray:
     return motion[3:] if np.any(motion[3:]) else motion[:3]
 
 
-def _frame_with_z(axis: FloatArray) -> FloatArray:
-    """Right-handed rotation whose z axis is the given unit vector."""
-    z = axis / np.linalg.norm(axis)
-    helper = np.eye(3)[int(np.argmin(np.abs(z)))]
-    x = np.cross(helper, z)
-    x /= np.linalg.norm(x)
-    return np.column_stack((x, np.cross(z, x), z))
+def _frames_with_z(axes: FloatArray) -> FloatArray:
+    """Right-handed rotations whose z axes are given vectors, (n, 3) to (n, 3, 3)."""
+    z = axes / np.sqrt((axes * axes).sum(axis=1, keepdims=True))
+    x = np.cross(np.eye(3)[np.abs(z).argmin(axis=1)], z)
+    x /= np.sqrt((x * x).sum(axis=1, keepdims=True))
+    return np.stack((x, np.cross(z, x), z), axis=2)
