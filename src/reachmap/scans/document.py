@@ -6,26 +6,8 @@ import dataclasses
 from collections.abc import Mapping
 from typing import Any
 
-from reachmap.core.planning.connection import (
-    CHECKS_LARGE,
-    CHECKS_SMALL,
-    GOALS_PER_ATTEMPT,
-    ROADMAP_PLANNER,
-)
-from reachmap.core.planning.roadmap import NEIGHBOURS
 from reachmap.core.scene import Scene
 from reachmap.maps import Provenance, Stamp, collect_provenance, config_sha256
-
-
-def roadmap_settings() -> dict[str, Any]:
-    """How roadmaps are made, as stored in artefacts."""
-    return {
-        "neighbours": NEIGHBOURS,
-        "planner": ROADMAP_PLANNER.model_dump(mode="json"),
-        "goals_per_attempt": GOALS_PER_ATTEMPT,
-        "max_checks_large": CHECKS_LARGE,
-        "max_checks_small": CHECKS_SMALL,
-    }
 
 
 def checking_settings(scene: Scene) -> dict[str, Any]:

@@ -13,6 +13,7 @@ import numpy as np
 
 from reachmap._typing import BoolArray, CodeArray, FloatArray, IntArray
 from reachmap.core.planning.approach import StraightApproach
+from reachmap.core.planning.roadmap import Goals
 from reachmap.core.scene import Scene
 from reachmap.maps.records import NO_PAIR, Status, freeze
 from reachmap.runtime.parallel import compute_units
@@ -66,6 +67,18 @@ class Survey:
     def goals(self) -> FloatArray:
         """Where plans end: pre-grasp configurations, shape (goals, dof)."""
         return self.way[self.way_begin]
+
+    def roadmap_goals(self) -> Goals:
+        """Goals of a roadmap, with the room that their approaches need."""
+        Q = self.goals
+        if not len(Q):
+            return Goals.of(Q, self.frame)
+        return Goals(
+            Q=Q,
+            frame=self.frame,
+            low=np.minimum.reduceat(self.way, self.way_begin),
+            high=np.maximum.reduceat(self.way, self.way_begin),
+        )
 
     def goals_of(self, frame: int) -> IntArray:
         """Rows of the goals of one frame."""

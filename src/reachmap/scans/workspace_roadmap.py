@@ -7,8 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from reachmap._typing import FloatArray, IntArray
-from reachmap.core.planning.connection import ROADMAP_PLANNER, Connection, connect
-from reachmap.core.planning.planner import Planner
+from reachmap.core.planning.connection import Connection, connect
 from reachmap.core.scene import Scene
 from reachmap.maps import Status
 from reachmap.runtime.progress import Progress
@@ -20,7 +19,6 @@ def connect_survey(
     scene: Scene,
     survey: Survey,
     *,
-    attempts: int,
     seed: int,
     progress: Progress | None = None,
 ) -> Connection:
@@ -30,21 +28,17 @@ def connect_survey(
     ----------
     scene : Scene
     survey : Survey
-    attempts : int
-        Attempts of the planner per component.
     seed : int
     progress : Progress, optional
         Counts frames as they are reached.
     """
     progress = progress or Progress("", quiet=True)
     progress.begin(len(np.unique(survey.frame)))
-    planner = Planner(scene.motions, ROADMAP_PLANNER)
     connection = connect(
         scene.scan_configuration,
-        survey.goals,
-        survey.frame,
-        planner,
-        attempts=attempts,
+        survey.roadmap_goals(),
+        scene.motions,
+        scene.loaded.cell.roadmap,
         seed=seed,
         on_frame=lambda: progress.add(1, 1),
     )
@@ -58,8 +52,10 @@ def results_of_connection(survey: Survey, connection: Connection) -> FrameResult
     A frame's goal is its connected configuration with the shortest path; its
     attempts are those of the components that its goals lie in.
     """
-    frames, goals = len(survey.status), survey.goals
-    length = connection.roadmap.shortest_paths().length_rad[1 : len(goals) + 1]
+    frames, dof = len(survey.status), survey.way.shape[1]
+    paths = connection.roadmap.shortest_paths()
+    node = connection.roadmap.shortest_to_goals(paths)
+    length = paths.length_rad[node]
     best = _best_goal(survey.frame, length, frames)
     found = best >= 0
     status = survey.status.copy()
@@ -67,8 +63,8 @@ def results_of_connection(survey: Survey, connection: Connection) -> FrameResult
     status[found] = Status.PATH_FOUND
     path_length = np.full(frames, np.nan)
     path_length[found] = length[best[found]]
-    configuration = np.full((frames, goals.shape[1]), np.nan)
-    configuration[found] = goals[best[found]]
+    configuration = np.full((frames, dof), np.nan)
+    configuration[found] = paths.configurations[node[best[found]]]
     component = _component_of_frames(survey.frame, connection, best, frames)
     attempts = np.zeros(frames, np.int64)
     known = connection.component >= 0
@@ -140,7 +136,7 @@ def path_to_frame(
         not connected.
     """
     paths = connection.roadmap.shortest_paths()
-    nodes = survey.goals_of(frame) + 1
+    nodes = connection.roadmap.shortest_to_goals(paths)[survey.goals_of(frame)]
     lengths = paths.length_rad[nodes]
     if not len(nodes) or not np.isfinite(lengths).any():
         return None

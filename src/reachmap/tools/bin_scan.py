@@ -16,8 +16,8 @@ from reachmap.maps import BinMap, Status, read_placement, read_workspace_map
 from reachmap.runtime.progress import Progress
 from reachmap.runtime.run import run_scan
 from reachmap.sampling.frames import FrameGrid, bin_test_frames
-from reachmap.scans.bin_scan import CHECKS_UNCONNECTED, bin_work, plan_grasps
-from reachmap.scans.document import checking_settings, roadmap_settings, scan_document
+from reachmap.scans.bin_scan import bin_work, plan_grasps
+from reachmap.scans.document import checking_settings, scan_document
 from reachmap.scans.ik_survey import Survey, SurveyContext, run_survey, survey_frames
 from reachmap.scans.workspace_roadmap import connect_survey
 from reachmap.tools.options import (
@@ -177,7 +177,6 @@ def _connected(scene: Scene, survey: Survey, progress: Progress) -> BoolArray:
     connection = connect_survey(
         scene,
         survey,
-        attempts=cell.bin_scan.repeats,
         seed=cell.seed,
         progress=progress,
     )
@@ -206,8 +205,7 @@ def _settings(scene: Scene) -> dict[str, Any]:
     return {
         **checking_settings(scene),
         "planner": cell.planner.model_dump(mode="json"),
-        "roadmap": roadmap_settings(),
-        "max_checks_unconnected": CHECKS_UNCONNECTED,
+        "roadmap": cell.roadmap.model_dump(mode="json"),
         "repeats": cell.bin_scan.repeats,
         "approach_distance_m": cell.bin_scan.approach_distance_m,
     }

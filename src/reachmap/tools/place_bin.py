@@ -47,7 +47,6 @@ from reachmap.runtime.progress import Progress
 from reachmap.scans.document import (
     checking_settings,
     provenance_from_document,
-    roadmap_settings,
     scan_document,
 )
 from reachmap.tools.options import IN_PROCESS, RunOptions, cell_of_artefact, with_seed
@@ -237,7 +236,7 @@ def _record(
         method=rule,
         settings={
             **checking_settings(scene),
-            "roadmap": roadmap_settings(),
+            "roadmap": placed.cell.roadmap.model_dump(mode="json"),
             "placement": placement_settings()
             | {
                 "top": choice.top,

@@ -22,7 +22,7 @@ from reachmap.maps.summary.statistics import level_means
 from reachmap.runtime.progress import Progress
 from reachmap.runtime.run import run_scan
 from reachmap.sampling.frames import workspace_frames
-from reachmap.scans.document import checking_settings, roadmap_settings, scan_document
+from reachmap.scans.document import checking_settings, scan_document
 from reachmap.scans.ik_survey import SurveyContext, run_survey, survey_frames
 from reachmap.scans.workspace_per_frame import per_frame_work, plan_frames
 from reachmap.scans.workspace_results import assemble_workspace_map
@@ -122,12 +122,10 @@ def _scan_by_roadmap(
             executor=run.executor,
             progress=Progress("workspace-scan survey", quiet=run.quiet),
         )
-    spec = scene.loaded.cell.workspace_scan
     with clock.phase("connect"):
         connection = connect_survey(
             scene,
             survey,
-            attempts=spec.repeats,
             seed=scene.loaded.cell.seed,
             progress=Progress("workspace-scan connect", quiet=run.quiet),
         )
@@ -147,13 +145,16 @@ def _survey_context(loaded: LoadedCell, *, with_bin: bool) -> SurveyContext:
 
 
 def _settings(scene: Scene, method: str) -> dict[str, Any]:
-    spec = scene.loaded.cell.workspace_scan
+    cell = scene.loaded.cell
     how = (
-        roadmap_settings()
+        {"roadmap": cell.roadmap.model_dump(mode="json")}
         if method == "roadmap"
-        else {"planner": scene.loaded.cell.planner.model_dump(mode="json")}
+        else {
+            "planner": cell.planner.model_dump(mode="json"),
+            "repeats": cell.workspace_scan.repeats,
+        }
     )
-    return {**checking_settings(scene), **how, "repeats": spec.repeats}
+    return {**checking_settings(scene), **how}
 
 
 def summary_of_workspace(workspace: WorkspaceMap | None) -> dict[str, Any]:
@@ -193,9 +194,7 @@ def estimate_workspace_scan(
     if method == "per-frame":
         plan_frames(scene, poses[rows], rows.tolist())
     else:
-        connect_survey(
-            scene, survey_frames(scene, poses[rows], 0.0), attempts=1, seed=0
-        )
+        connect_survey(scene, survey_frames(scene, poses[rows], 0.0), seed=0)
     seconds = (time.perf_counter() - begin) / len(rows) * len(poses)
     workers = run.workers if method == "per-frame" else 1
     return {

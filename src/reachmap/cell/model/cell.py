@@ -17,6 +17,7 @@ from reachmap.cell.model.fields import (
 )
 from reachmap.cell.model.parameters import Parameters
 from reachmap.cell.model.planner import PlannerSpec
+from reachmap.cell.model.roadmap import RoadmapSpec
 from reachmap.cell.model.robot import IkSpec, JointLimits, Resources, RobotSpec, TcpSpec
 from reachmap.cell.model.scans import (
     BinScanSpec,
@@ -37,6 +38,7 @@ __all__ = [
     "JointLimits",
     "PlacementSpec",
     "Resources",
+    "RoadmapSpec",
     "RobotSpec",
     "ScanConfiguration",
     "TcpSpec",
@@ -122,6 +124,9 @@ class Cell(Record):
     workspace_scan: WorkspaceScanSpec = Field(description="The workspace scan.")
     bin_scan: BinScanSpec = Field(BinScanSpec(), description="The bin scan.")
     planner: PlannerSpec = Field(PlannerSpec(), description="The planner.")
+    roadmap: RoadmapSpec = Field(
+        RoadmapSpec(), description="How frames are connected, and on what evidence not."
+    )
     placement: PlacementSpec = Field(
         PlacementSpec(), description="Limits that place-bin keeps to."
     )

@@ -1,44 +1,45 @@
 """Connects the scan configuration to what exploring the roadmap did not reach.
 
-Components are tried largest first. For each, straight motions from reached
-configurations near by come first, since they cost next to nothing; then the planner,
-from the nearest reached configuration and from the scan configuration, to goals spread
-over the component. Failure is not proof of absence: the budget spent is recorded.
+Planners of different kinds take turns, with budgets that rise: what one misses another
+often finds at once. First they aim at goals spread over all that is open; then at each
+component by itself, the largest first, after straight motions from reached
+configurations near by, which cost next to nothing. They begin at the scan configuration
+or at the reached configuration that is nearest, and wherever a plan arrives, exploring
+goes on. What stays open is looked at once more by a lazy roadmap of samples, a method
+that is independent of the planners. Failure is not proof of absence: what was spent,
+and by which method, is recorded.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from itertools import islice
 
 import numpy as np
-from scipy.spatial import cKDTree
 
-from reachmap._typing import FloatArray, IntArray
+from reachmap._typing import BoolArray, FloatArray, IntArray
 from reachmap.cell.model.planner import PlannerSpec, SimplificationSpec
-from reachmap.core.planning.planner import Planner
-from reachmap.core.planning.roadmap import (
-    START,
-    CandidateMotions,
+from reachmap.cell.model.roadmap import RoadmapSpec
+from reachmap.core.kinematics.windings import TURN_RAD, Windings
+from reachmap.core.planning.candidates import CandidateMotions, NearestNeighbours
+from reachmap.core.planning.exploring import (
     Explorer,
-    Roadmap,
+    KnownMotions,
     components_of_open_goals,
 )
-from reachmap.core.planning.timing import path_length_rad
+from reachmap.core.planning.lazy_prm import LazySamples
+from reachmap.core.planning.motion import MotionChecker
+from reachmap.core.planning.planner import Planner
+from reachmap.core.planning.roadmap import START, Goals, Roadmap
 
-GOALS_PER_ATTEMPT = 16
-STRAIGHT_TRIES = 12
-SMALL_COMPONENT = 40
-CHECKS_LARGE = 20_000
-CHECKS_SMALL = 2_000
-
-# Where in a component a plan arrives does not matter.
-ROADMAP_PLANNER = PlannerSpec(
-    name="RRTConnect",
-    range_rad=0.5,
-    max_checks=CHECKS_LARGE,
-    simplification=SimplificationSpec(other_goals=False),
-)
+_SHARES = (10, 5)
+# A tree of LBKPIECE1 that found nothing soon is begun anew; that of a planner which
+# grows from both ends is worth more the longer it grows.
+_RESTARTS = {"RRTConnect": None}
+_RESTART_CHECKS = 150
+_TURNS_PER_GOAL = 3
+STRAIGHT, SAMPLES = "straight", "samples"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -50,25 +51,35 @@ class Connection:
     roadmap : Roadmap
     component : int array, shape (goals,)
         Component of each goal: 0 was explored from the scan configuration, the others
-        from where a plan arrived, or were not reached; -1 for goals not needed.
-    attempts, paths_found : int array, shape (components,)
-        Attempts at joining each component to the scan configuration, by a plan or a
-        straight motion, and whether one succeeded.
+        from where a path arrived, or were not reached; -1 for goals not needed.
+    attempts : int array, shape (components,)
+        Attempts at joining each component, by plans, straight motions and samples.
+    reached : bool array, shape (components,)
+        Whether one succeeded.
+    methods : tuple of str
+        Exploring, the planners, the lazy roadmap.
+    checks : int array, shape (components, methods)
+        State checks that each method spent on each component.
+    agreed : bool array, shape (components,)
+        Whether the verdict rests on more than the planners: there is a verified path,
+        or the lazy roadmap finds no way out of the component either.
     """
 
     roadmap: Roadmap
     component: IntArray
     attempts: IntArray
-    paths_found: IntArray
+    reached: BoolArray
+    methods: tuple[str, ...]
+    checks: IntArray
+    agreed: BoolArray
 
 
 def connect(
     start: FloatArray,
-    goals: FloatArray,
-    frame: IntArray,
-    planner: Planner,
+    goals: Goals,
+    motions: MotionChecker,
+    spec: RoadmapSpec,
     *,
-    attempts: int,
     seed: int,
     on_frame: Callable[[], object] = lambda: None,
 ) -> Connection:
@@ -77,139 +88,296 @@ def connect(
     Parameters
     ----------
     start : array, shape (dof,)
-    goals : array, shape (n, dof)
+    goals : Goals
         Free configurations of all frames.
-    frame : int array, shape (n,)
-        Frame of each goal.
-    planner : Planner
-        For components, see :data:`ROADMAP_PLANNER`.
-    attempts : int
-        Attempts of the planner per component.
+    motions : MotionChecker
+    spec : RoadmapSpec
     seed : int
     on_frame : callable
-        Called for each frame that is reached by exploring, to report progress.
+        Called for each frame that is reached, to report progress.
     """
-    roadmap = Roadmap.of(start, goals, frame)
-    motions = planner.motions
-    candidates = CandidateMotions.of(roadmap.goal_array, motions.checker.reach_m)
-    connector = _Connector(roadmap, planner, seed)
-    explorer = Explorer(roadmap, candidates, motions, on_frame)
-    connector.explore(explorer, attempts)
-    connector.connect(components_of_open_goals(roadmap, candidates, motions), attempts)
+    windings = Windings(motions.checker.robot)
+    turns = windings.nearest(goals.Q, start, goals.low, goals.high)
+    roadmap = Roadmap.of(start, goals.turned(TURN_RAD * turns))
+    connector = _Connector(roadmap, motions, windings, spec, seed, on_frame)
+    connector.connect()
     return connector.connection()
 
 
+@dataclass(slots=True, eq=False)
+class _Component:
+    """Goals that share one fate, and what was tried."""
+
+    members: IntArray
+    checks: IntArray
+    attempts: int = 0
+    is_pocket: bool = False
+
+
 class _Connector:
-    """Collects components, as sets of nodes, with what it took to join them."""
+    """Collects components with what it took to join them."""
 
-    def __init__(self, roadmap: Roadmap, planner: Planner, seed: int) -> None:
-        self._roadmap, self._planner, self._seed = roadmap, planner, seed
+    def __init__(
+        self,
+        roadmap: Roadmap,
+        motions: MotionChecker,
+        windings: Windings,
+        spec: RoadmapSpec,
+        seed: int,
+        on_frame: Callable[[], object],
+    ) -> None:
+        self._roadmap, self._motions = roadmap, motions
+        self._windings, self._spec, self._seed = windings, spec, seed
         self._Q = roadmap.goal_array
-        self._weight = planner.motions.checker.reach_m
-        self._components: list[IntArray] = []
-        self._attempts: list[int] = []
-        self._tree: cKDTree | None = None
+        self._weight = motions.checker.reach_m
+        self._planners = [Planner(motions, s) for s in portfolio(spec)]
+        self._methods = (STRAIGHT, *spec.planners, SAMPLES)
+        self._reached: list[_Component] = []
+        self._open: list[_Component] = []
+        self._plans = 0
+        self._order = list(range(len(spec.planners)))
+        self._samples: LazySamples | None = None
+        self._nearest = _NearestReached(roadmap, self._Q, self._weight, windings)
+        self._candidates = CandidateMotions.of(self._Q, self._weight, windings, spec)
+        self._known = KnownMotions(motions, len(self._Q))
+        self._explorer = Explorer(
+            roadmap, self._candidates, self._known, windings, on_frame
+        )
 
-    def explore(self, explorer: Explorer, attempts: int) -> None:
-        """Explore from the start, then from wherever plans arrive.
-
-        Plans go to goals spread over all that is open, until ``attempts`` of them
-        fail in a row.
-        """
-        self._components.append(explorer.explore(START, START, 0.0))
-        self._attempts.append(1)
-        failures = plans = 0
-        while failures < attempts:
-            nodes = np.flatnonzero(self._roadmap.open_goals())
-            if not len(nodes):
-                break
-            found = self._plan(START, nodes, (0, plans), CHECKS_LARGE)
-            plans += 1
-            failures += 1
-            if found is not None:
-                node, length_rad = found
-                self._components.append(explorer.explore(node, START, length_rad))
-                self._attempts.append(failures)
-                failures = 0
-
-    def connect(self, components: list[IntArray], attempts: int) -> None:
-        """Plan to each component; afterwards look once more at what lies near."""
-        first = len(self._components)
-        self._components += components
-        self._attempts += [0] * len(components)
-        for label in range(first, len(self._components)):
-            if self._roadmap.open_goals()[self._components[label]].any():
-                self._connect(label, attempts)
-        for label in range(first, len(self._components)):
-            if not self._is_reached(label):
-                self._join_straight(label)
+    def connect(self) -> None:
+        """Explore, then plan to whatever is open."""
+        first = self._component(np.zeros(0, np.int64))
+        with _Meter(self, first, STRAIGHT):
+            first.members = self._explorer.explore_start()
+        first.attempts = 1
+        self._reached.append(first)
+        self._plan_to_all()
+        nodes = components_of_open_goals(
+            self._roadmap, self._candidates, self._known, self._windings
+        )
+        self._open = [self._component(members) for members in nodes]
+        few, many = (self._spec.max_checks // share for share in _SHARES)
+        self._each_open(self._join_straight)
+        self._each_open(lambda part: self._plan_to(part, few, starts=4))
+        self._each_open(self._search_samples)
+        self._each_open(self._join_straight)
+        self._each_open(lambda part: self._plan_to(part, many, starts=1))
 
     def connection(self) -> Connection:
         """Sum up."""
         component = np.full(len(self._Q), -1, np.int64)
-        for label, members in enumerate(self._components):
-            component[members] = label
-        reached = [self._is_reached(k) for k in range(len(self._components))]
+        parts = [*self._reached, *self._open]
+        for label, part in enumerate(parts):
+            component[part.members] = label
+        is_reached = np.arange(len(parts)) < len(self._reached)
         return Connection(
             roadmap=self._roadmap,
             component=component[1:],
-            attempts=np.array(self._attempts, np.int64),
-            paths_found=np.array(reached, np.int64),
+            attempts=np.array([part.attempts for part in parts], np.int64),
+            reached=is_reached,
+            methods=self._methods,
+            checks=np.array([part.checks for part in parts], np.int64),
+            agreed=is_reached | np.array([part.is_pocket for part in parts], bool),
         )
 
-    def _is_reached(self, label: int) -> bool:
-        return bool(self._roadmap.reached[self._components[label][0]])
+    def _component(self, members: IntArray) -> _Component:
+        return _Component(members, np.zeros(len(self._methods), np.int64))
 
-    def _connect(self, label: int, attempts: int) -> None:
-        if self._join_straight(label):
-            return
-        members = self._components[label]
-        budget = CHECKS_SMALL if len(members) < SMALL_COMPONENT else CHECKS_LARGE
-        for attempt in range(attempts):
-            self._attempts[label] += 1
-            start = START if attempt % 2 else int(self._nearest_pairs(label)[1][0])
-            if self._plan(start, members, (label, attempt), budget) is not None:
-                self._accept(label)
+    def _plan_to_all(self) -> None:
+        """Plan to goals spread over all that is open, until no planner arrives."""
+        attempt = self._component(np.zeros(0, np.int64))
+        while True:
+            attempt.members = np.flatnonzero(self._roadmap.open_goals())
+            if not len(attempt.members):
                 return
+            if not (
+                self._join_straight(attempt)
+                or self._plan(attempt, self._order[0], self._spec.max_checks // 20, 4)
+                or self._plan_to(attempt, self._spec.max_checks, starts=1)
+            ):
+                return
+            attempt = self._component(np.zeros(0, np.int64))
 
-    def _join_straight(self, label: int) -> bool:
-        for goal, node in zip(*self._nearest_pairs(label), strict=True):
-            if self._planner.motions.is_verified(self._Q[node], self._Q[goal]):
-                self._roadmap.edges.append((int(node), int(goal)))
-                self._attempts[label] += 1
-                self._accept(label)
-                return True
-        return False
+    def _each_open(self, attempt: Callable[[_Component], bool]) -> None:
+        """Try each open component; what is reached in passing is left out."""
+        for part in tuple(self._open):
+            if part in self._open:
+                attempt(part)
 
-    def _plan(
-        self, start: int, nodes: IntArray, key: tuple[int, int], budget: int
-    ) -> tuple[int, float] | None:
-        """Plan to some of the nodes; the one reached, and the length of the path."""
-        rng = np.random.default_rng([self._seed, *key])
-        if len(nodes) > GOALS_PER_ATTEMPT:
-            nodes = np.sort(rng.choice(nodes, GOALS_PER_ATTEMPT, replace=False))
-        result = self._planner.plan(
-            self._Q[start],
-            self._Q[nodes],
-            int(rng.integers(1, 2**31)),
-            max_checks=budget,
-        )
+    def _plan_to(self, part: _Component, budget: int, starts: int) -> bool:
+        """Let the planners take turns, the one that arrived last first."""
+        return any(self._plan(part, m, budget, starts) for m in tuple(self._order))
+
+    def _plan(self, part: _Component, method: int, budget: int, count: int) -> bool:
+        """Plan to some members of a component and explore from where that arrives."""
+        self._plans += 1
+        rng = np.random.default_rng([self._seed, self._plans])
+        nodes = part.members
+        if len(nodes) > self._spec.goals_per_plan:
+            nodes = np.sort(rng.choice(nodes, self._spec.goals_per_plan, replace=False))
+        starts = self._starts(nodes)[:count]
+        goal_nodes, turns = self._turned(nodes, self._roadmap.configurations[starts[0]])
+        part.attempts += 1
+        with _Meter(self, part, self._spec.planners[method]):
+            result = self._planners[method].plan(
+                np.array([self._roadmap.configurations[k] for k in starts]),
+                self._Q[goal_nodes] + TURN_RAD * turns,
+                int(rng.integers(1, 2**31)),
+                max_checks=budget,
+            )
         if result.path is None:
-            return None
-        node = int(nodes[result.goal])
-        self._roadmap.add_path(result.path, start, node)
-        return node, path_length_rad(result.path)
+            return False
+        self._order.remove(method)
+        self._order.insert(0, method)
+        row, start = result.goal, starts[result.start]
+        self._arrive(part, int(goal_nodes[row]), turns[row], start, result.path)
+        return True
 
-    def _accept(self, label: int) -> None:
-        self._roadmap.reached[self._components[label]] = True
-        self._tree = None
+    def _starts(self, nodes: IntArray) -> list[int]:
+        """The scan configuration, and the reached nodes that are nearest to goals."""
+        near = self._nearest_pairs(nodes)[1][: self._spec.starts_per_plan - 1]
+        return [START, *(k for k in dict.fromkeys(near.tolist()) if k != START)]
 
-    def _nearest_pairs(self, label: int) -> tuple[IntArray, IntArray]:
-        """Members of a component and their nearest reached nodes, nearest first."""
-        reached = np.flatnonzero(self._roadmap.reached)
-        if self._tree is None:
-            self._tree = cKDTree(self._Q[reached] * self._weight)
-        members = self._components[label]
-        distance, row = self._tree.query(self._Q[members] * self._weight)
-        order = np.argsort(distance, kind="stable")[:STRAIGHT_TRIES]
-        return members[order], reached[row[order]]
+    def _turned(self, nodes: IntArray, q: FloatArray) -> tuple[IntArray, IntArray]:
+        """Goals at the turns nearest to a configuration, nodes and turns."""
+        if not self._windings.exist:
+            return nodes, np.zeros((len(nodes), self._Q.shape[1]), np.int64)
+        goals = self._roadmap.goals
+        found = sorted(
+            (distance, int(node), turns)
+            for node in nodes
+            for distance, turns in islice(
+                self._windings.in_order(
+                    self._Q[node], q, goals.low[node - 1], goals.high[node - 1]
+                ),
+                _TURNS_PER_GOAL,
+            )
+        )
+        return (
+            np.array([node for _, node, _ in found], np.int64),
+            np.array([turns for _, _, turns in found], np.int64),
+        )
+
+    def _join_straight(self, part: _Component) -> bool:
+        """Try the straight motions to a component from what is reached near by."""
+        with _Meter(self, part, STRAIGHT):
+            for goal, node in zip(*self._nearest_pairs(part.members), strict=True):
+                q = self._roadmap.configurations[node]
+                change, _ = self._windings.shortest(self._Q[goal] - q)
+                turns = np.round((q + change - self._Q[goal]) / TURN_RAD)
+                turns = np.where(self._windings.turns, turns, 0).astype(np.int64)
+                q_goal = self._Q[goal] + TURN_RAD * turns
+                if self._allows(int(goal), turns) and self._motions.is_verified(
+                    q, q_goal
+                ):
+                    break
+            else:
+                return False
+        part.attempts += 1
+        self._arrive(part, int(goal), turns, int(node), np.array([q, q_goal]))
+        return True
+
+    def _allows(self, goal_node: int, turns: IntArray) -> bool:
+        goals = self._roadmap.goals
+        low, high = goals.low[goal_node - 1], goals.high[goal_node - 1]
+        return not turns.any() or self._windings.allows(low, high, turns)
+
+    def _search_samples(self, part: _Component) -> bool:
+        """Look for a way out of a component with the lazy roadmap of samples."""
+        if not self._spec.samples:
+            return False
+        if self._samples is None:
+            self._samples = LazySamples(
+                self._roadmap,
+                self._motions,
+                self._windings,
+                self._spec,
+                np.random.default_rng([self._seed, 1 << 20]),
+            )
+        part.attempts += 1
+        with _Meter(self, part, SAMPLES):
+            way = self._samples.way_out(part.members, self._spec.sample_checks)
+        part.is_pocket = way.is_pocket
+        if way.path is None:
+            return False
+        self._arrive(part, way.goal_node, way.turns, way.node, way.path)
+        return True
+
+    def _arrive(
+        self,
+        part: _Component,
+        goal_node: int,
+        turns: IntArray,
+        before: int,
+        path: FloatArray,
+    ) -> None:
+        """Explore from where a path arrives, and see what is left open."""
+        with _Meter(self, part, STRAIGHT):
+            members = self._explorer.explore(goal_node, turns, before, path)
+        arrived = self._component(members)
+        arrived.checks, arrived.attempts = part.checks.copy(), part.attempts
+        self._reached.append(arrived)
+        is_open = self._roadmap.open_goals()
+        for other in self._open:
+            other.members = other.members[is_open[other.members]]
+        self._open = [other for other in self._open if len(other.members)]
+
+    def _nearest_pairs(self, nodes: IntArray) -> tuple[IntArray, IntArray]:
+        """Goals and the reached nodes nearest to them, nearest first."""
+        self._nearest.look_at(np.flatnonzero(self._roadmap.open_goals()))
+        distance, node = self._nearest.distance[nodes], self._nearest.node[nodes]
+        order = np.argsort(distance, kind="stable")[: self._spec.straight_tries]
+        return nodes[order], node[order]
+
+
+class _NearestReached:
+    """The reached node nearest to each goal, kept up to date as nodes are reached."""
+
+    def __init__(
+        self, roadmap: Roadmap, Q: FloatArray, weight: FloatArray, windings: Windings
+    ) -> None:
+        self._roadmap, self._Q = roadmap, Q
+        self._weight, self._windings = weight, windings
+        self._seen = 0
+        self.distance = np.full(len(Q), np.inf)
+        self.node = np.full(len(Q), START, np.int64)
+
+    def look_at(self, nodes: IntArray) -> None:
+        """Take in what was reached since, for the goals that are still open."""
+        reached = np.array(self._roadmap.reached[self._seen :], np.int64)
+        if not len(reached):
+            return
+        self._seen = len(self._roadmap.reached)
+        new = np.array([self._roadmap.configurations[k] for k in reached])
+        tree = NearestNeighbours(new, self._weight, self._windings)
+        distance, row = (found[:, 0] for found in tree.of(self._Q[nodes], 1))
+        nearer = distance < self.distance[nodes]
+        self.distance[nodes[nearer]] = distance[nearer]
+        self.node[nodes[nearer]] = reached[row[nearer]]
+
+
+class _Meter:
+    """Adds the state checks made within it to what a method spent on a component."""
+
+    def __init__(self, connector: _Connector, part: _Component, method: str) -> None:
+        self._checker = connector._motions.checker
+        self._checks, self._row = part.checks, connector._methods.index(method)
+
+    def __enter__(self) -> None:
+        self._begin = self._checker.checks
+
+    def __exit__(self, *_: object) -> None:
+        self._checks[self._row] += self._checker.checks - self._begin
+
+
+def portfolio(spec: RoadmapSpec) -> Iterator[PlannerSpec]:
+    """Planners of a roadmap; where in a component they arrive does not matter."""
+    for name in spec.planners:
+        yield PlannerSpec(
+            name=name,
+            range_rad=spec.range_rad,
+            projection_cell_rad=spec.projection_cell_rad,
+            max_checks=spec.max_checks,
+            restart_checks=_RESTARTS.get(name, _RESTART_CHECKS),
+            simplification=SimplificationSpec(other_goals=False),
+        )

@@ -133,7 +133,7 @@ class OmplSearch:
 
     def search(
         self,
-        start: FloatArray,
+        starts: FloatArray,
         goals: FloatArray,
         seed: np.random.SeedSequence,
         budget: Budget,
@@ -142,7 +142,7 @@ class OmplSearch:
 
         Parameters
         ----------
-        start : array, shape (dof,)
+        starts : array, shape (k, dof)
         goals : array, shape (m, dof)
             Within the limits.
         seed : SeedSequence
@@ -154,14 +154,15 @@ class OmplSearch:
         ou.RNG.setSeed(int(seed.generate_state(1)[0]) or 1)
         space = self._space()
         information = ob.SpaceInformation(space)
-        checker, dof = self._motions.checker, range(len(start))
+        checker, dof = self._motions.checker, range(starts.shape[1])
         information.setStateValidityChecker(
             lambda state: checker.is_free(np.array([state[i] for i in dof]))
         )
         information.setMotionValidator(_MotionValidator(information, self._motions))
         information.setup()
         problem = ob.ProblemDefinition(information)
-        problem.addStartState(_state(information, start))
+        for q in starts:
+            problem.addStartState(_state(information, q))
         goal = ob.GoalStates(information)
         for q in goals:
             goal.addState(_state(information, q))
@@ -176,7 +177,7 @@ class OmplSearch:
         planner.solve(ob.PlannerTerminationCondition(budget.search_ends))
         if not problem.hasExactSolution():
             return None
-        return FoundPath(information, problem.getSolutionPath(), len(start))
+        return FoundPath(information, problem.getSolutionPath(), starts.shape[1])
 
     def _space(self) -> Any:
         robot = self._motions.checker.robot

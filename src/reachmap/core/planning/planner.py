@@ -33,6 +33,8 @@ class PlanResult:
         Verified, from the start to a goal [rad].
     goal : int
         Row of the goal reached, -1 without a path.
+    start : int
+        Row of the start it begins at, 0 without a path.
     checks : int
         State checks spent on searching.
     planning_time_s, planning_cpu_time_s : float
@@ -53,6 +55,7 @@ class PlanResult:
     simplification_time_s: float
     hit_time_limit: bool
     unverified: int
+    start: int = 0
 
 
 class Planner:
@@ -81,8 +84,8 @@ class Planner:
 
         Parameters
         ----------
-        start : array, shape (dof,)
-            Free configuration.
+        start : array, shape (dof,) or (k, dof)
+            Free configuration, or several, any of which will do.
         goals : array, shape (m, dof)
             Free configurations, any of which will do.
         seed : int
@@ -90,7 +93,7 @@ class Planner:
         max_checks : int, optional
             Budget in state checks; default: the cell's.
         """
-        robot = self.motions.checker.robot
+        robot, starts = self.motions.checker.robot, np.atleast_2d(start)
         inside = ((goals >= robot.lower_rad) & (goals <= robot.upper_rad)).all(axis=1)
         rows = np.flatnonzero(inside)
         goals = goals[rows]
@@ -101,7 +104,7 @@ class Planner:
         )
         clock = _Clock()
         unverified, path = 0, None
-        for found in self._found(start, goals, seed, budget):
+        for found in self._found(starts, goals, seed, budget):
             clock.end_search()
             with budget.paused():
                 path = self._shorten_and_verify(found, goals, seed)
@@ -120,24 +123,26 @@ class Planner:
             simplification_time_s=clock.shortening_cpu_s,
             hit_time_limit=budget.out_of_time,
             unverified=unverified,
+            start=0 if path is None else _nearest_row(starts, path[0]),
         )
 
     def _found(
-        self, start: FloatArray, goals: FloatArray, seed: int, budget: Budget
+        self, starts: FloatArray, goals: FloatArray, seed: int, budget: Budget
     ) -> Iterator[_Straight | FoundPath]:
         """Paths at the planning step, until the budget is spent."""
         if not len(goals):
             return
         if self.spec.straight_first:
             # Free, it is the shortest path there is: nothing is left to search for.
-            nearest = goals[np.argmin(np.linalg.norm(goals - start, axis=1))]
-            if self.motions.is_free(start, nearest):
-                yield _Straight(np.array([start, nearest]))
+            away = np.linalg.norm(goals - starts[:, None], axis=2)
+            first, nearest = np.unravel_index(np.argmin(away), away.shape)
+            if self.motions.is_free(starts[first], goals[nearest]):
+                yield _Straight(np.array([starts[first], goals[nearest]]))
         seeds = np.random.SeedSequence(seed)
         allowance = self._first_allowance(budget)
         while not budget.spent():
             budget.begin_search(allowance)
-            search = self._ompl.search(start, goals, seeds.spawn(1)[0], budget)
+            search = self._ompl.search(starts, goals, seeds.spawn(1)[0], budget)
             if search is not None:
                 yield search
             elif budget.search_interrupted:

@@ -13,8 +13,8 @@ import numpy as np
 
 from reachmap._typing import FloatArray, IntArray
 from reachmap.core.planning.approach import StraightApproach
-from reachmap.core.planning.connection import ROADMAP_PLANNER, Connection, connect
-from reachmap.core.planning.planner import Planner
+from reachmap.core.planning.connection import Connection, connect
+from reachmap.core.planning.roadmap import Goals
 from reachmap.core.scene import Scene
 from reachmap.geometry import yaw_transform
 from reachmap.placement.mapped.sample import Sample

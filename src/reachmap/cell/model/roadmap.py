@@ -1,0 +1,69 @@
+"""Settings of the roadmap: which planners, how hard they try, how it is joined."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import Field, model_validator
+
+from reachmap.cell.model.fields import Positive, Record
+from reachmap.cell.model.planner import PlannerName
+
+Checks = Annotated[int, Field(ge=1, le=10**9)]
+Few = Annotated[int, Field(ge=1, le=1000)]
+
+
+class RoadmapSpec(Record):
+    """How frames are connected to the scan configuration, and on what evidence not."""
+
+    planners: tuple[PlannerName, ...] = Field(
+        ("LBKPIECE1", "RRTConnect"),
+        min_length=1,
+        max_length=8,
+        description="OMPL planners, in turns: what one misses another finds.",
+    )
+    max_checks: Checks = Field(
+        20000, description="State checks of each planner for a component."
+    )
+    range_rad: Positive = Field(
+        0.5, description="Longest motion that a planner adds [rad]."
+    )
+    projection_cell_rad: Positive = Field(
+        1.0, description="Cells that guide a KPIECE planner [rad]."
+    )
+    goals_per_plan: Few = Field(
+        16, description="Goals of a plan, spread over what is open."
+    )
+    starts_per_plan: Few = Field(
+        4,
+        description="Configurations a plan may begin at: the scan configuration, and "
+        "reached ones near its goals.",
+    )
+    samples: int = Field(
+        3000,
+        ge=0,
+        le=10**6,
+        description="Configurations of the lazy roadmap around what stays open.",
+    )
+    sample_checks: Checks = Field(
+        15000, description="State checks of the lazy roadmap for a component."
+    )
+    sample_neighbours: Few = Field(
+        14, description="Neighbours of a configuration of the lazy roadmap."
+    )
+    neighbours: Few = Field(8, description="Neighbours that a goal may be joined to.")
+    start_neighbours: Few = Field(
+        64, description="Neighbours of the scan configuration."
+    )
+    longest_motion_rad: Positive = Field(
+        2.2, description="Longest change of a joint between neighbours [rad]."
+    )
+    straight_tries: Few = Field(
+        12, description="Straight motions tried to a component before planning."
+    )
+
+    @model_validator(mode="after")
+    def _planners_differ(self) -> RoadmapSpec:
+        if len(set(self.planners)) < len(self.planners):
+            raise ValueError(f"planners repeat: {', '.join(self.planners)}")
+        return self
