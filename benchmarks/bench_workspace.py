@@ -48,9 +48,7 @@ def scan(overrides: Sequence[str], workers: int) -> tuple[int, int, dict[str, fl
         progress=Progress("", quiet=True),
     )
     middle = time.perf_counter()
-    connection = connect_survey(
-        scene, survey, attempts=spec.repeats, seed=loaded.cell.seed
-    )
+    connection = connect_survey(scene, survey, seed=loaded.cell.seed)
     results = results_of_connection(survey, connection)
     end = time.perf_counter()
     seconds = {"survey": middle - begin, "connect": end - middle}

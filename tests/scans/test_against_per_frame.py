@@ -35,7 +35,7 @@ def test_the_roadmap_misses_nothing_that_planning_finds():
     cubes = workspace_frames(cell.workspace_scan, cell.robot.tcp.approach_axis)
     poses = np.concatenate([c.frames.transforms().reshape(-1, 4, 4) for c in cubes])
     survey = survey_frames(scene, poses, 0.0)
-    connection = connect_survey(scene, survey, attempts=5, seed=1)
+    connection = connect_survey(scene, survey, seed=1)
     reached = np.zeros(len(poses), bool)
     reached[connection.roadmap.frames_reached()] = True
     rows = np.random.default_rng(11).permutation(len(poses))[:SAMPLE]

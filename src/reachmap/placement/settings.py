@@ -20,7 +20,7 @@ def placement_settings() -> dict[str, Any]:
             "coarse": list(sample.COARSE),
         },
         "max_layers": sample.MAX_LAYERS,
-        "attempts": exact.ATTEMPTS,
+        "share_of_checks": exact.SHARE_OF_CHECKS,
         "steps_per_square": places.STEPS_PER_SQUARE,
         "yaw_step_deg": places.YAW_STEP_DEG,
         "yaws_per_level": places.YAWS_PER_LEVEL,

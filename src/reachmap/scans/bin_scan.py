@@ -11,6 +11,7 @@ import numpy as np
 
 from reachmap._typing import BoolArray, CodeArray, FloatArray, IntArray
 from reachmap.cell.model.cell import Cell
+from reachmap.core.kinematics.windings import Windings
 from reachmap.core.planning.planner import PlanResult
 from reachmap.core.scene import Scene
 from reachmap.maps import BinMap, PathStore, RunInfo, Stamp, Status, write_bin_map
@@ -185,8 +186,6 @@ def _path_store(results: GraspResults, shape: tuple[int, ...]) -> PathStore:
 
 
 GRASPS_PER_UNIT = 45
-CHECKS_UNCONNECTED = 1_000
-"""Budget of an attempt at a grasp that the roadmap could not connect."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -258,45 +257,36 @@ def plan_grasps(
     grasps : sequence of int
         Their numbers in the survey, which with the cell's seed make their own.
     connected : bool array, shape (len(grasps),)
-        Whether the roadmap proves a path; if not, attempts are short.
+        Whether the roadmap proves a path.
     """
-    goals = [survey.goals[survey.goals_of(grasp)] for grasp in grasps]
-    plans: list[list[PlanResult]] = [[] for _ in grasps]
-    for repeat in range(scene.loaded.cell.bin_scan.repeats):
+    windings, start = Windings(scene.robot), scene.scan_configuration
+    goals = [
+        survey.goals_near(survey.goals_of(grasp), start, windings) for grasp in grasps
+    ]
+    plans: list[list[tuple[PlanResult, int]]] = [[] for _ in grasps]
+    cell = scene.loaded.cell
+    for repeat in range(cell.bin_scan.repeats):
         for row, grasp in enumerate(grasps):
-            if len(goals[row]):
-                plan = _attempt(scene, goals[row], grasp, repeat, bool(connected[row]))
-                plans[row].append(plan)
+            Q, goal = goals[row]
+            if len(Q):
+                seed = attempt_seed(cell.seed, grasp, repeat)
+                plan = scene.planner.plan(start, Q, seed)
+                plans[row].append((plan, int(goal[plan.goal])))
     return [
         _results(scene, survey, grasp, plans[row], connected=bool(connected[row]))
         for row, grasp in enumerate(grasps)
     ]
 
 
-def _attempt(
-    scene: Scene, goals: FloatArray, grasp: int, repeat: int, connected: bool
-) -> PlanResult:
-    cell = scene.loaded.cell
-    return scene.planner.plan(
-        scene.scan_configuration,
-        goals,
-        attempt_seed(cell.seed, grasp, repeat),
-        max_checks=None
-        if connected
-        else min(CHECKS_UNCONNECTED, cell.planner.max_checks),
-    )
-
-
 def _results(
     scene: Scene,
     survey: Survey,
     grasp: int,
-    plans: Sequence[PlanResult],
+    plans: Sequence[tuple[PlanResult, int]],
     *,
     connected: bool,
 ) -> GraspResults:
     repeats = scene.loaded.cell.bin_scan.repeats
-    goals = survey.goals_of(grasp)
     measured = np.full((1, repeats, len(MEASURED)), np.nan)
     out_of_time = np.zeros((1, repeats), np.uint8)
     checks = np.zeros((1, repeats), np.int64)
@@ -304,12 +294,12 @@ def _results(
     planned: list[int] = []
     place: list[tuple[int, int]] = []
     meter = Meter(scene)
-    for repeat, plan in enumerate(plans):
+    for repeat, (plan, goal) in enumerate(plans):
         out_of_time[0, repeat] = plan.hit_time_limit
         checks[0, repeat] = plan.checks
         if plan.path is None:
             continue
-        way = survey.way_of(int(goals[plan.goal]))
+        way = survey.way_from(goal, plan.path[-1])
         paths.append(np.vstack([plan.path, way[1:]]))
         planned.append(len(plan.path))
         place.append((0, repeat))
@@ -333,12 +323,16 @@ def _results(
 
 
 def _status(
-    survey: Survey, grasp: int, plans: Sequence[PlanResult], *, connected: bool
+    survey: Survey,
+    grasp: int,
+    plans: Sequence[tuple[PlanResult, int]],
+    *,
+    connected: bool,
 ) -> int:
     if not plans:
         return int(survey.status[grasp])
     # A path that the roadmap proves counts, even if every attempt missed it.
-    found = connected or any(plan.path is not None for plan in plans)
+    found = connected or any(plan.path is not None for plan, _ in plans)
     return Status.PATH_FOUND if found else Status.NO_PATH_FOUND
 
 

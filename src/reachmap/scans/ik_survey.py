@@ -7,11 +7,13 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import islice
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from reachmap._typing import BoolArray, CodeArray, FloatArray, IntArray
+from reachmap.core.kinematics.windings import TURN_RAD, Windings
 from reachmap.core.planning.approach import StraightApproach
 from reachmap.core.planning.roadmap import Goals
 from reachmap.core.scene import Scene
@@ -24,6 +26,8 @@ if TYPE_CHECKING:
     from reachmap.cell.loading import LoadedCell
 
 MAX_COUNT = 255
+TURNS_TRIED = 4
+"""Turns of one solution that a plan is given at once."""
 
 
 @dataclass(frozen=True, kw_only=True)  # no slots: it keeps what it works out
@@ -68,6 +72,7 @@ class Survey:
         """Where plans end: pre-grasp configurations, shape (goals, dof)."""
         return self.way[self.way_begin]
 
+    @cached_property
     def roadmap_goals(self) -> Goals:
         """Goals of a roadmap, with the room that their approaches need."""
         Q = self.goals
@@ -89,6 +94,35 @@ class Survey:
         """Approach of one goal, shape (n, dof)."""
         begin = int(self.way_begin[goal])
         return self.way[begin : begin + int(self.way_size[goal])]
+
+    def way_from(self, goal: int, q: FloatArray) -> FloatArray:
+        """Approach of one goal from its pre-grasp at whatever turns, shape (n, dof)."""
+        way = self.way_of(goal)
+        return np.asarray(way + TURN_RAD * np.round((q - way[0]) / TURN_RAD))
+
+    def goals_near(
+        self, rows: IntArray, q: FloatArray, windings: Windings
+    ) -> tuple[FloatArray, IntArray]:
+        """Goals as a planner is to see them: with a few turns, the nearest first.
+
+        Parameters
+        ----------
+        rows : int array, shape (n,)
+        q : array, shape (dof,)
+            Where plans begin.
+        windings : Windings
+
+        Returns
+        -------
+        Q : array, shape (m, dof)
+        row : int array, shape (m,)
+            Goal that each of them is.
+        """
+        every = self.roadmap_goals
+        row, turns = windings.spread(
+            every.Q[rows], q, every.low[rows], every.high[rows], each=TURNS_TRIED
+        )
+        return every.Q[rows[row]] + TURN_RAD * turns, rows[row]
 
 
 def survey_frames(scene: Scene, T_base_tcp: FloatArray, approach_m: float) -> Survey:
@@ -133,6 +167,7 @@ class _Surveyor:
             scene.loaded.cell.robot.tcp.approach_axis,
             approach_m,
         )
+        self._windings = Windings(scene.robot)
         count = len(T_base_tcp)
         self._status = np.full(count, Status.NO_IK, np.uint8)
         self._pair = np.full(count, NO_PAIR, np.int64)
@@ -140,7 +175,9 @@ class _Surveyor:
     def survey(self) -> Survey:
         """Solve all frames, then look at each frame's configurations."""
         count = len(self._T)
-        Q, frame = self._scene.kinematics.solve_many(self._T, windings=False)
+        Q, frame = self._scene.kinematics.solve_many(
+            self._T, windings=False, near=self._scene.scan_configuration
+        )
         free = self._scene.checker.free_mask(Q)
         n_ik = np.bincount(frame, minlength=count)
         n_free = np.bincount(frame[free], minlength=count)
@@ -172,9 +209,7 @@ class _Surveyor:
         if self._approach.distance_m == 0:
             self._status[k] = Status.NOT_ATTEMPTED
             return [q[None] for q in Q[free]]
-        ways = [
-            w for q in Q[free] if (w := self._approach.of(self._T[k], q)) is not None
-        ]
+        ways = [w for q in Q[free] if (w := self._way(self._T[k], q)) is not None]
         found = [way for way in ways if self._approach.is_free(way)]
         self._status[k] = Status.NOT_ATTEMPTED if found else Status.APPROACH_BLOCKED
         if not found:
@@ -183,6 +218,17 @@ class _Surveyor:
                 NO_PAIR,
             )
         return found
+
+    def _way(self, T_base_tcp: FloatArray, q: FloatArray) -> FloatArray | None:
+        """Approach of a branch, at other turns where these end at a limit."""
+        way = self._approach.of(T_base_tcp, q)
+        if way is None and self._windings.exist:
+            nearest = self._windings.in_order(q, self._scene.scan_configuration, q, q)
+            for _, turns in islice(nearest, 1, TURNS_TRIED):
+                way = self._approach.of(T_base_tcp, q + TURN_RAD * np.array(turns))
+                if way is not None:
+                    break
+        return way
 
 
 FRAMES_PER_UNIT = 270

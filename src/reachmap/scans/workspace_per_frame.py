@@ -11,6 +11,7 @@ import numpy as np
 
 from reachmap._typing import FloatArray
 from reachmap.cell.model.cell import Cell
+from reachmap.core.kinematics.windings import Windings
 from reachmap.core.planning.timing import path_length_rad
 from reachmap.core.scene import Scene
 from reachmap.maps import RunInfo, Status, WorkspaceMap, write_workspace_map
@@ -98,11 +99,14 @@ def plan_frames(
     cell = scene.loaded.cell
     survey = survey_frames(scene, T_base_tcp, 0.0)
     count, dof = len(T_base_tcp), scene.robot.dof
+    windings = Windings(scene.robot)
     status = survey.status.copy()
     attempts, found = np.zeros(count, np.uint8), np.zeros(count, np.uint8)
     length, goal = np.full(count, np.nan), np.full((count, dof), np.nan)
     for k in np.flatnonzero(status == Status.NOT_ATTEMPTED).tolist():
-        goals = survey.goals[survey.goals_of(k)]
+        goals, _ = survey.goals_near(
+            survey.goals_of(k), scene.scan_configuration, windings
+        )
         status[k] = Status.NO_PATH_FOUND
         for repeat in range(cell.workspace_scan.repeats):
             attempts[k] += 1

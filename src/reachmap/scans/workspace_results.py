@@ -18,6 +18,7 @@ from reachmap.maps import (
     WorkspaceMap,
     workspace_map_from_cubes,
 )
+from reachmap.maps.parts import Components
 from reachmap.maps.records import freeze
 from reachmap.sampling.frames import CubeFrames, workspace_frames
 from reachmap.scans.document import provenance_from_document
@@ -78,7 +79,11 @@ class FrameResults:
 
 
 def assemble_workspace_map(
-    document: Mapping[str, Any], results: FrameResults, *, run: RunInfo
+    document: Mapping[str, Any],
+    results: FrameResults,
+    *,
+    run: RunInfo,
+    components: Components | None = None,
 ) -> WorkspaceMap:
     """Make the map of a scan.
 
@@ -88,6 +93,8 @@ def assemble_workspace_map(
         See :func:`reachmap.scans.document.scan_document`.
     results : FrameResults
     run : RunInfo
+    components : Components, optional
+        Evidence of the roadmap.
     """
     cell = Cell.model_validate_json(document["provenance"]["cell_resolved_json"])
     cubes = workspace_frames(cell.workspace_scan, cell.robot.tcp.approach_axis)
@@ -103,6 +110,7 @@ def assemble_workspace_map(
         joint_names=tuple(document["joint_names"]),
         body_pairs=tuple(document["body_pairs"]),
         method=document["method"],
+        components=components,
         stamp=Stamp(**document["stamp"]),
         provenance=provenance_from_document(document),
         run=run,

@@ -10,6 +10,7 @@ from reachmap._typing import FloatArray, IntArray
 from reachmap.core.planning.connection import Connection, connect
 from reachmap.core.scene import Scene
 from reachmap.maps import Status
+from reachmap.maps.parts import Components
 from reachmap.runtime.progress import Progress
 from reachmap.scans.ik_survey import MAX_COUNT, Survey
 from reachmap.scans.workspace_results import FrameResults
@@ -36,7 +37,7 @@ def connect_survey(
     progress.begin(len(np.unique(survey.frame)))
     connection = connect(
         scene.scan_configuration,
-        survey.roadmap_goals(),
+        survey.roadmap_goals,
         scene.motions,
         scene.loaded.cell.roadmap,
         seed=seed,
@@ -115,6 +116,31 @@ def _distinct(
     """Frames and the attempts of each different component they touch."""
     pairs = np.unique(np.stack([frame, component], axis=1), axis=0)
     return pairs[:, 0], np.asarray(attempts)[pairs[:, 1]]
+
+
+def components_of(connection: Connection) -> Components:
+    """Evidence of a connection as artefacts keep it."""
+    return Components(
+        attempts=connection.attempts,
+        checks=connection.checks.sum(axis=1),
+        reached=connection.reached.astype(np.uint8),
+        agreed=connection.agreed.astype(np.uint8),
+        method_checks=connection.checks,
+        methods=connection.methods,
+    )
+
+
+def component_of_frames(survey: Survey, connection: Connection) -> IntArray:
+    """Component of each frame of a survey, shape (frames,).
+
+    That of its goal with the shortest path, or of any goal where none is connected;
+    -1 without goals.
+    """
+    frames = len(survey.status)
+    paths = connection.roadmap.shortest_paths()
+    length = paths.length_rad[connection.roadmap.shortest_to_goals(paths)]
+    best = _best_goal(survey.frame, length, frames)
+    return _component_of_frames(survey.frame, connection, best, frames)
 
 
 def path_to_frame(

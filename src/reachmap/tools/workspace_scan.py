@@ -26,7 +26,11 @@ from reachmap.scans.document import checking_settings, scan_document
 from reachmap.scans.ik_survey import SurveyContext, run_survey, survey_frames
 from reachmap.scans.workspace_per_frame import per_frame_work, plan_frames
 from reachmap.scans.workspace_results import assemble_workspace_map
-from reachmap.scans.workspace_roadmap import connect_survey, results_of_connection
+from reachmap.scans.workspace_roadmap import (
+    components_of,
+    connect_survey,
+    results_of_connection,
+)
 from reachmap.tools.options import IN_PROCESS, RunOptions, with_seed
 from reachmap.tools.prologue import (
     check_scan_output,
@@ -130,7 +134,9 @@ def _scan_by_roadmap(
             progress=Progress("workspace-scan connect", quiet=run.quiet),
         )
     results = results_of_connection(survey, connection)
-    return assemble_workspace_map(document, results, run=clock.finish())
+    return assemble_workspace_map(
+        document, results, run=clock.finish(), components=components_of(connection)
+    )
 
 
 def _survey_context(loaded: LoadedCell, *, with_bin: bool) -> SurveyContext:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from reachmap._typing import CodeArray, FloatArray, IntArray
+from reachmap.core.kinematics.windings import Windings
 from reachmap.core.planning.planner import PlanResult
 from reachmap.core.scene import Scene
 from reachmap.maps.records import NO_PAIR, Status, freeze
@@ -178,18 +179,17 @@ def _attempt(
     scene: Scene, survey: Survey, key: tuple[int, ...]
 ) -> list[tuple[PlanResult, int]]:
     """Plans of one attempt, each with the row of the goal it reached, or -1."""
-    plans = []
+    plans, windings = [], Windings(scene.robot)
     recommended = survey.goals_of(0)
     others = np.arange(len(recommended), len(survey.frame))
     for stage, rows in enumerate((recommended, others)):
         if not len(rows):
             continue
+        goals, row = survey.goals_near(rows, scene.scan_configuration, windings)
         plan = scene.planner.plan(
-            scene.scan_configuration,
-            survey.goals[rows],
-            attempt_seed(*key, stage),
+            scene.scan_configuration, goals, attempt_seed(*key, stage)
         )
-        plans.append((plan, int(rows[plan.goal]) if plan.path is not None else -1))
+        plans.append((plan, int(row[plan.goal]) if plan.path is not None else -1))
         if plan.path is not None:
             break
     return plans
@@ -200,7 +200,9 @@ def _measure(
 ) -> FloatArray:
     """Numbers of a successful attempt; the time of the plan that failed counts."""
     final, goal = plans[-1]
-    measured = np.array(meter.measured(final, survey.way_of(goal)))
+    assert final.path is not None
+    way = survey.way_from(goal, final.path[-1])
+    measured = np.array(meter.measured(final, way))
     for plan, _ in plans[:-1]:
         measured[MEASURED.index("planning_time")] += plan.planning_time_s
         measured[MEASURED.index("planning_cpu_time")] += plan.planning_cpu_time_s

@@ -5,18 +5,28 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from reachmap.core.planning.connection import ROADMAP_PLANNER, connect
-from reachmap.core.planning.planner import Planner
-from reachmap.core.planning.roadmap import CandidateMotions, UnionFind
+from reachmap.cell.model.roadmap import RoadmapSpec
+from reachmap.core.kinematics.windings import Windings
+from reachmap.core.planning.candidates import CandidateMotions, UnionFind
+from reachmap.core.planning.connection import connect
+from reachmap.core.planning.roadmap import Goals
 from tests.support.scenes import scene_of
 
+SMALL = RoadmapSpec(max_checks=2000, samples=300, sample_checks=2000)
 
-def connection_of(scene, goals, frame, attempts=2, seed=1):
+
+def connection_of(scene, goals, frame, seed=1, spec=SMALL):
     """Connect goals to the scan configuration of a scene."""
-    planner = Planner(scene.motions, ROADMAP_PLANNER)
-    return connect(
-        scene.scan_configuration, goals, frame, planner, attempts=attempts, seed=seed
-    )
+    goals = Goals.of(goals, frame)
+    return connect(scene.scan_configuration, goals, scene.motions, spec, seed=seed)
+
+
+def nodes_reached(connection):
+    """Which goals are reached as they stand."""
+    reached = np.zeros(len(connection.roadmap.goals.frame) + 1, bool)
+    nodes = np.array(connection.roadmap.reached)
+    reached[nodes[nodes < len(reached)]] = True
+    return reached[1:]
 
 
 def toy_goals(scene, count, seed):
@@ -34,8 +44,16 @@ def test_the_two_halves_of_the_toy_are_told_apart(count):
     scene = scene_of("planar-toy")
     Q, same_side = toy_goals(scene, count, 3)
     connection = connection_of(scene, Q, np.arange(len(Q)))
-    np.testing.assert_array_equal(connection.roadmap.reached[1:], same_side)
-    assert (connection.attempts >= connection.paths_found).all()
+    np.testing.assert_array_equal(nodes_reached(connection), same_side)
+    assert (connection.attempts >= connection.reached).all()
+    # What is behind the post is open, with what each method spent on it.
+    behind = connection.component[~same_side]
+    assert not connection.reached[behind].any()
+    assert connection.agreed.all()
+    spent = dict(zip(connection.methods, connection.checks[behind].T, strict=True))
+    assert set(connection.methods) == {"straight", "LBKPIECE1", "RRTConnect", "samples"}
+    for name, checks in spent.items():
+        assert (checks > 0).all(), name
 
 
 def test_routes_run_over_verified_motions():
@@ -61,9 +79,9 @@ def test_a_frame_is_reached_by_any_of_its_goals():
     connection = connection_of(scene, Q, np.array([0, 0, 1]))
     np.testing.assert_array_equal(connection.roadmap.frames_reached(), [0])
     labels = connection.component
-    assert connection.paths_found[labels[0]] == 1
-    assert connection.paths_found[labels[2]] == 0
-    assert connection.attempts[labels[2]] == 2
+    assert connection.reached[labels[0]]
+    assert not connection.reached[labels[2]]
+    assert connection.attempts[labels[2]] > 2
 
 
 def test_the_roadmap_is_repeatable():
@@ -90,7 +108,8 @@ def test_candidates_are_the_nearest_neighbours():
     """Each configuration is a candidate of its nearest neighbours, by brute force."""
     rng = np.random.default_rng(6)
     Q, weight = rng.normal(size=(80, 3)) * 0.5, np.array([1.0, 0.5, 0.2])
-    graph = CandidateMotions.of(Q, weight, neighbours=4)
+    no_turns = Windings(scene_of("planar-toy").robot)
+    graph = CandidateMotions.of(Q, weight, no_turns, RoadmapSpec(neighbours=4))
     distance = np.linalg.norm((Q[:, None] - Q[None]) * weight, axis=2)
     for k in range(1, len(Q)):
         nearest = set(np.argsort(distance[k])[1:5].tolist())

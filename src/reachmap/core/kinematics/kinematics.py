@@ -100,7 +100,7 @@ class Kinematics:
         return self.solve_many(np.asarray(T, float)[None], windings=windings)[0]
 
     def solve_many(
-        self, T: FloatArray, *, windings: bool = True
+        self, T: FloatArray, *, windings: bool = True, near: FloatArray | None = None
     ) -> tuple[FloatArray, IntArray]:
         """All solutions for many poses.
 
@@ -115,7 +115,9 @@ class Kinematics:
         windings : bool
             Whether a solution is repeated for every whole turn of its joints that
             is within the limits. There may be many: 32 for each solution of a UR5
-            with limits of ±2π. Otherwise the one nearest to the middle of the limits.
+            with limits of ±2π. Otherwise the one nearest to `near`, joint by joint.
+        near : array, shape (dof,), optional
+            Default: the middle of the limits.
 
         Returns
         -------
@@ -131,6 +133,7 @@ class Kinematics:
             self.robot.upper_rad,
             self.robot.is_revolute,
             windings=windings,
+            near=near,
         )
 
     def follow(

@@ -63,6 +63,7 @@ def within_limits(
     is_revolute: BoolArray,
     *,
     windings: bool = True,
+    near: FloatArray | None = None,
 ) -> Rows:
     """Add whole turns to revolute joints, keep what lies within the limits.
 
@@ -74,7 +75,9 @@ def within_limits(
     is_revolute : array of bool, shape (dof,)
     windings : bool
         All turns, up to 2⁶ rows for each row of a six-axis arm with limits ±2π;
-        otherwise one, the nearest to the middle of the limits.
+        otherwise one, the nearest to `near`.
+    near : array, shape (dof,), optional
+        Default: the middle of the limits.
 
     Returns
     -------
@@ -93,7 +96,8 @@ def within_limits(
     if windings:
         Q, frame = _all_turns(Q, frame, first, last)
     else:
-        nearest = np.round(((lower + upper) / 2 - Q) / _TURN)
+        middle = (lower + upper) / 2 if near is None else near
+        nearest = np.round((middle - Q) / _TURN)
         Q = Q + _TURN * np.clip(nearest, first, last)
     return np.clip(Q, lower, upper), frame
 

@@ -1,15 +1,16 @@
 """Whole turns of joints: other positions of the arm at the same configuration.
 
 A joint with more than a full turn of range reaches every position modulo 2π at two or
-more angles. The body is in the same place, so collisions are the same; limits and paths
-are not. Each such winding is a solution of its own. There may be dozens of them, so they
-are named when they are wanted: the nearest first.
+more angles. The body is in the same place, so collisions are the same; limits and
+paths are not. Each such winding is a solution of its own. There may be dozens of them,
+so they are named when they are wanted: the nearest first.
 """
 
 from __future__ import annotations
 
 import heapq
 from collections.abc import Iterator
+from itertools import islice
 
 import numpy as np
 
@@ -73,7 +74,9 @@ class Windings:
         """
         first = np.ceil((self._lower - low - _SLACK_RAD) / TURN_RAD)
         last = np.floor((self._upper - high + _SLACK_RAD) / TURN_RAD)
-        first, last = (np.where(self.turns, k, 0.0).astype(np.int64) for k in (first, last))
+        first, last = (
+            np.where(self.turns, k, 0.0).astype(np.int64) for k in (first, last)
+        )
         # A way that is within the limits as it stands stays possible.
         return np.minimum(first, 0), np.maximum(last, 0)
 
@@ -145,3 +148,42 @@ class Windings:
                 if digit + 1 < len(choices[k]) and following not in seen:
                     seen.add(following)
                     heapq.heappush(pending, entry(following))
+
+    def spread(
+        self,
+        Q: FloatArray,
+        q: FloatArray,
+        low: FloatArray,
+        high: FloatArray,
+        *,
+        each: int,
+    ) -> tuple[IntArray, IntArray]:
+        """A few turns of several configurations, the nearest to another one first.
+
+        Parameters
+        ----------
+        Q : array, shape (n, dof)
+        q : array, shape (dof,)
+        low, high : array, shape (n, dof)
+            What the ways on from Q span.
+        each : int
+            Most turns of each configuration.
+
+        Returns
+        -------
+        row : int array, shape (m,)
+            Row of Q; as they stand, in order, where no joint has more than a turn.
+        turns : int array, shape (m, dof)
+        """
+        if not self.exist:
+            return np.arange(len(Q)), np.zeros(Q.shape, np.int64)
+        found = sorted(
+            (distance, row, turns)
+            for row in range(len(Q))
+            for distance, turns in islice(
+                self.in_order(Q[row], q, low[row], high[row]), each
+            )
+        )
+        rows = np.array([row for _, row, _ in found], np.int64)
+        turned = np.array([turns for _, _, turns in found], np.int64)
+        return rows, turned.reshape(-1, Q.shape[1])

@@ -12,6 +12,8 @@ from reachmap._typing import BoolArray, FloatArray, IntArray
 from reachmap.cell.model.roadmap import RoadmapSpec
 from reachmap.core.kinematics.windings import TURN_RAD, Windings
 
+_WORTH_THREADS = 1000
+
 
 class UnionFind:
     """Disjoint sets of ``0 … n − 1``."""
@@ -61,7 +63,9 @@ class NearestNeighbours:
         """Distances and rows of the nearest configurations, shape (m, count)."""
         count = min(count, self._tree.n)
         distance, row = self._tree.query(
-            self._weighted(Q), k=[*range(1, count + 1)], workers=-1 if len(Q) > 1000 else 1
+            self._weighted(Q),
+            k=[*range(1, count + 1)],
+            workers=-1 if len(Q) > _WORTH_THREADS else 1,
         )
         return np.asarray(distance, float), np.asarray(row, np.int64)
 

@@ -14,7 +14,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from itertools import islice
 
 import numpy as np
 
@@ -33,9 +32,12 @@ from reachmap.core.planning.motion import MotionChecker
 from reachmap.core.planning.planner import Planner
 from reachmap.core.planning.roadmap import START, Goals, Roadmap
 
-_SHARES = (10, 5)
-# A tree of LBKPIECE1 that found nothing soon is begun anew; that of a planner which
-# grows from both ends is worth more the longer it grows.
+# Parts of the budget of a plan to all that is open: for the try from what is reached
+# near by, which finds most of what is easy, and for the two at each component, of which
+# there are many where something is unreachable. Chosen on six hard cells, by checks.
+_LEAST, _FEW, _SOME = 0.05, 0.1, 0.2
+# A tree of LBKPIECE1 that found nothing soon is begun anew; RRTConnect finds 1 of 6
+# frames in a cage when begun anew every 150 checks, and 6 of 6 when it is left to grow.
 _RESTARTS = {"RRTConnect": None}
 _RESTART_CHECKS = 150
 _TURNS_PER_GOAL = 3
@@ -62,7 +64,7 @@ class Connection:
         State checks that each method spent on each component.
     agreed : bool array, shape (components,)
         Whether the verdict rests on more than the planners: there is a verified path,
-        or the lazy roadmap finds no way out of the component either.
+        or the lazy roadmap found none with the checks that it had either.
     """
 
     roadmap: Roadmap
@@ -98,7 +100,7 @@ def connect(
     """
     windings = Windings(motions.checker.robot)
     turns = windings.nearest(goals.Q, start, goals.low, goals.high)
-    roadmap = Roadmap.of(start, goals.turned(TURN_RAD * turns))
+    roadmap = Roadmap.of(start, goals.turned(turns))
     connector = _Connector(roadmap, motions, windings, spec, seed, on_frame)
     connector.connect()
     return connector.connection()
@@ -111,7 +113,7 @@ class _Component:
     members: IntArray
     checks: IntArray
     attempts: int = 0
-    is_pocket: bool = False
+    agreed: bool = False
 
 
 class _Connector:
@@ -156,12 +158,16 @@ class _Connector:
             self._roadmap, self._candidates, self._known, self._windings
         )
         self._open = [self._component(members) for members in nodes]
-        few, many = (self._spec.max_checks // share for share in _SHARES)
+        few, some = self._share(_FEW), self._share(_SOME)
+        several = self._spec.starts_per_plan
         self._each_open(self._join_straight)
-        self._each_open(lambda part: self._plan_to(part, few, starts=4))
+        self._each_open(lambda part: self._plan_to(part, few, several))
         self._each_open(self._search_samples)
         self._each_open(self._join_straight)
-        self._each_open(lambda part: self._plan_to(part, many, starts=1))
+        self._each_open(lambda part: self._plan_to(part, some, starts=1))
+
+    def _share(self, share: float) -> int:
+        return max(1, int(self._spec.max_checks * share))
 
     def connection(self) -> Connection:
         """Sum up."""
@@ -177,7 +183,7 @@ class _Connector:
             reached=is_reached,
             methods=self._methods,
             checks=np.array([part.checks for part in parts], np.int64),
-            agreed=is_reached | np.array([part.is_pocket for part in parts], bool),
+            agreed=is_reached | np.array([part.agreed for part in parts], bool),
         )
 
     def _component(self, members: IntArray) -> _Component:
@@ -186,13 +192,14 @@ class _Connector:
     def _plan_to_all(self) -> None:
         """Plan to goals spread over all that is open, until no planner arrives."""
         attempt = self._component(np.zeros(0, np.int64))
+        least, several = self._share(_LEAST), self._spec.starts_per_plan
         while True:
             attempt.members = np.flatnonzero(self._roadmap.open_goals())
             if not len(attempt.members):
                 return
             if not (
                 self._join_straight(attempt)
-                or self._plan(attempt, self._order[0], self._spec.max_checks // 20, 4)
+                or self._plan(attempt, self._order[0], least, several)
                 or self._plan_to(attempt, self._spec.max_checks, starts=1)
             ):
                 return
@@ -209,14 +216,25 @@ class _Connector:
         return any(self._plan(part, m, budget, starts) for m in tuple(self._order))
 
     def _plan(self, part: _Component, method: int, budget: int, count: int) -> bool:
-        """Plan to some members of a component and explore from where that arrives."""
+        """Plan to some members of a component and explore from where that arrives.
+
+        It may begin at ``count`` configurations, the first being the scan one.
+        """
         self._plans += 1
         rng = np.random.default_rng([self._seed, self._plans])
         nodes = part.members
         if len(nodes) > self._spec.goals_per_plan:
             nodes = np.sort(rng.choice(nodes, self._spec.goals_per_plan, replace=False))
         starts = self._starts(nodes)[:count]
-        goal_nodes, turns = self._turned(nodes, self._roadmap.configurations[starts[0]])
+        goals = self._roadmap.goals
+        row, turns = self._windings.spread(
+            self._Q[nodes],
+            self._roadmap.configurations[starts[0]],
+            goals.low[nodes - 1],
+            goals.high[nodes - 1],
+            each=_TURNS_PER_GOAL,
+        )
+        goal_nodes = nodes[row]
         part.attempts += 1
         with _Meter(self, part, self._spec.planners[method]):
             result = self._planners[method].plan(
@@ -229,34 +247,14 @@ class _Connector:
             return False
         self._order.remove(method)
         self._order.insert(0, method)
-        row, start = result.goal, starts[result.start]
-        self._arrive(part, int(goal_nodes[row]), turns[row], start, result.path)
+        goal, start = result.goal, starts[result.start]
+        self._arrive(part, int(goal_nodes[goal]), turns[goal], start, result.path)
         return True
 
     def _starts(self, nodes: IntArray) -> list[int]:
         """The scan configuration, and the reached nodes that are nearest to goals."""
         near = self._nearest_pairs(nodes)[1][: self._spec.starts_per_plan - 1]
         return [START, *(k for k in dict.fromkeys(near.tolist()) if k != START)]
-
-    def _turned(self, nodes: IntArray, q: FloatArray) -> tuple[IntArray, IntArray]:
-        """Goals at the turns nearest to a configuration, nodes and turns."""
-        if not self._windings.exist:
-            return nodes, np.zeros((len(nodes), self._Q.shape[1]), np.int64)
-        goals = self._roadmap.goals
-        found = sorted(
-            (distance, int(node), turns)
-            for node in nodes
-            for distance, turns in islice(
-                self._windings.in_order(
-                    self._Q[node], q, goals.low[node - 1], goals.high[node - 1]
-                ),
-                _TURNS_PER_GOAL,
-            )
-        )
-        return (
-            np.array([node for _, node, _ in found], np.int64),
-            np.array([turns for _, _, turns in found], np.int64),
-        )
 
     def _join_straight(self, part: _Component) -> bool:
         """Try the straight motions to a component from what is reached near by."""
@@ -280,7 +278,7 @@ class _Connector:
     def _allows(self, goal_node: int, turns: IntArray) -> bool:
         goals = self._roadmap.goals
         low, high = goals.low[goal_node - 1], goals.high[goal_node - 1]
-        return not turns.any() or self._windings.allows(low, high, turns)
+        return self._windings.allows(low, high, turns)
 
     def _search_samples(self, part: _Component) -> bool:
         """Look for a way out of a component with the lazy roadmap of samples."""
@@ -297,8 +295,8 @@ class _Connector:
         part.attempts += 1
         with _Meter(self, part, SAMPLES):
             way = self._samples.way_out(part.members, self._spec.sample_checks)
-        part.is_pocket = way.is_pocket
-        if way.path is None:
+        part.agreed = way is None
+        if way is None:
             return False
         self._arrive(part, way.goal_node, way.turns, way.node, way.path)
         return True

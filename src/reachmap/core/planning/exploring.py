@@ -33,9 +33,7 @@ class KnownMotions:
         self._motions, self._nodes = motions, nodes
         self._known: dict[int, bool] = {}
 
-    def is_verified(
-        self, a: int, b: int, q_from: FloatArray, q_to: FloatArray
-    ) -> bool:
+    def is_verified(self, a: int, b: int, q_from: FloatArray, q_to: FloatArray) -> bool:
         """Whether the shortest motion between two nodes is free."""
         key = min(a, b) * self._nodes + max(a, b)
         known = self._known.get(key)
@@ -176,7 +174,7 @@ class Explorer:
     def _within_limits(self, goal_node: int, turns: IntArray) -> bool:
         goals = self._roadmap.goals
         low, high = goals.low[goal_node - 1], goals.high[goal_node - 1]
-        return not turns.any() or self._windings.allows(low, high, turns)
+        return self._windings.allows(low, high, turns)
 
     def _number(self, turns: IntArray) -> int:
         key = turns.tobytes()

@@ -26,25 +26,22 @@ _AROUND_RAD = (0.05, 1.0)
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class WayOut:
-    """How a search ended.
+    """A path that was found.
 
     Attributes
     ----------
-    path : array, shape (n, dof), or None
+    path : array, shape (n, dof)
         Verified, from a connected node to a goal.
     node, goal_node : int
-        Where it begins, and the goal it ends at as it stands; -1 without a path.
+        Where it begins, and the goal it ends at as it stands.
     turns : int array, shape (dof,)
         Whole turns at which it arrives.
-    is_pocket : bool
-        Whether the search ran out of motions rather than of checks.
     """
 
-    path: FloatArray | None
+    path: FloatArray
     node: int
     goal_node: int
     turns: IntArray
-    is_pocket: bool
 
 
 class LazySamples:
@@ -72,34 +69,29 @@ class LazySamples:
         goals = roadmap.goal_array
         self._goals = len(goals)
         around = goals[np.flatnonzero(roadmap.open_goals())]
-        waypoints = [
-            node for node in roadmap.reached if roadmap.goal_of(node) < 0
-        ]
+        waypoints = [node for node in roadmap.reached if roadmap.goal_of(node) < 0]
         self._waypoint_node = waypoints
         on_the_way = np.array([roadmap.configurations[k] for k in waypoints])
         samples = self._free_samples(around, rng)
         self._Q = np.vstack([goals, on_the_way, samples])
         weight = motions.checker.reach_m
         self._near_goals = NearestNeighbours(goals, weight, windings)
-        self._near_samples = NearestNeighbours(
-            self._Q[self._goals :], weight, windings
-        )
+        self._near_samples = NearestNeighbours(self._Q[self._goals :], weight, windings)
         self._known: dict[tuple[int, int], bool] = {}
 
-    def _free_samples(
-        self, around: FloatArray, rng: np.random.Generator
-    ) -> FloatArray:
+    def _free_samples(self, around: FloatArray, rng: np.random.Generator) -> FloatArray:
         """Half of the samples anywhere, half around the open goals; the free ones."""
         robot, count = self._motions.checker.robot, self._spec.samples
         low, high = robot.lower_rad, robot.upper_rad
         anywhere = rng.uniform(low, high, (count - count // 2, robot.dof))
         centre = around[rng.integers(0, len(around), count // 2)]
-        spread = np.exp(rng.uniform(*np.log(_AROUND_RAD), (len(centre), 1)))
+        least, most = np.log(_AROUND_RAD).tolist()
+        spread = np.exp(rng.uniform(least, most, (len(centre), 1)))
         near = centre + spread * rng.normal(size=centre.shape)
         samples = np.vstack([anywhere, np.clip(near, low, high)])
         return samples[self._motions.checker.free_mask(samples)]
 
-    def way_out(self, members: IntArray, checks: int) -> WayOut:
+    def way_out(self, members: IntArray, checks: int) -> WayOut | None:
         """Look for a path between goals and what is connected.
 
         Parameters
@@ -108,6 +100,11 @@ class LazySamples:
             Nodes of the goals, as they stand.
         checks : int
             Budget in state checks.
+
+        Returns
+        -------
+        WayOut or None
+            None where the budget, or what motions there are, came to an end.
         """
         checker = self._motions.checker
         limit = checker.checks + checks
@@ -129,18 +126,12 @@ class LazySamples:
                     return way
                 continue
             self._push(pending, distance, node, left)
-        return WayOut(
-            path=None,
-            node=-1,
-            goal_node=-1,
-            turns=np.zeros(self._Q.shape[1], np.int64),
-            is_pocket=not pending,
-        )
+        return None
 
     def _connected(self) -> dict[int, int]:
         """Node of the roadmap at which each configuration here is connected."""
         roadmap = self._roadmap
-        connected = {}
+        connected: dict[int, int] = {}
         for node in roadmap.reached:
             goal = roadmap.goal_of(node)
             if goal >= 0 or node == 0:
@@ -203,6 +194,6 @@ class LazySamples:
         goals = self._roadmap.goals
         inside = ((way >= robot.lower_rad) & (way <= robot.upper_rad)).all()
         low, high = goals.low[node - 1], goals.high[node - 1]
-        if not inside or (turns.any() and not self._windings.allows(low, high, turns)):
+        if not inside or not self._windings.allows(low, high, turns):
             return None
-        return WayOut(path=way, node=start, goal_node=node, turns=turns, is_pocket=False)
+        return WayOut(path=way, node=start, goal_node=node, turns=turns)

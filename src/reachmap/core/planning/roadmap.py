@@ -17,6 +17,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import dijkstra
 
 from reachmap._typing import BoolArray, FloatArray, IntArray
+from reachmap.core.kinematics.windings import TURN_RAD
 
 START = 0
 
@@ -46,8 +47,9 @@ class Goals:
         """Goals from which nothing leads on."""
         return cls(Q=Q, frame=np.asarray(frame, np.int64), low=Q, high=Q)
 
-    def turned(self, turn_rad: FloatArray) -> Goals:
-        """The same goals at other turns of their joints, shape (goals, dof) [rad]."""
+    def turned(self, turns: IntArray) -> Goals:
+        """The same goals at other turns of their joints, shape (goals, dof)."""
+        turn_rad = TURN_RAD * turns.astype(float)
         return Goals(
             Q=self.Q + turn_rad,
             frame=self.frame,

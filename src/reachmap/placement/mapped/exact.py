@@ -7,11 +7,13 @@ reached.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from reachmap._typing import FloatArray, IntArray
+from reachmap.cell.model.roadmap import RoadmapSpec
 from reachmap.core.planning.approach import StraightApproach
 from reachmap.core.planning.connection import Connection, connect
 from reachmap.core.planning.roadmap import Goals
@@ -19,7 +21,9 @@ from reachmap.core.scene import Scene
 from reachmap.geometry import yaw_transform
 from reachmap.placement.mapped.sample import Sample
 
-ATTEMPTS = 1
+# Hundreds of poses are compared: a plan has a quarter of the checks that it has for a
+# map, and no second opinion.
+SHARE_OF_CHECKS = 4
 ALWAYS = -1.0
 NEVER = 1000.0
 ROUNDING = 1e-9
@@ -90,7 +94,9 @@ class PlacedScene:
 
     def _survey(self) -> None:
         scene = self.scene
-        Q, frame = scene.kinematics.solve_many(self.T, windings=False)
+        Q, frame = scene.kinematics.solve_many(
+            self.T, windings=False, near=scene.scan_configuration
+        )
         self._has_ik = np.bincount(frame, minlength=len(self.T)) > 0
         free = scene.checker.free_mask(Q)
         Q, frame = Q[free], frame[free]
@@ -175,25 +181,38 @@ class PlacedScene:
         way = self._approach.of(self.T[k], self.Q[row])
         if way is None or (len(way) > 1 and not self._approach.is_free(way)):
             return False
-        goals.q.append(way[0])
+        goals.way.append(way)
         goals.frame.append(k)
         return True
 
     def _connect(self, q: FloatArray, goals: _Goals) -> Connection:
-        scene = self.scene
-        order = np.argsort(goals.frame, kind="stable")
-        Q = np.array(goals.q).reshape(-1, scene.robot.dof)[order]
-        planner = Planner(scene.motions, ROADMAP_PLANNER)
-        frame = np.array(goals.frame, np.int64)[order]
-        seed = scene.loaded.cell.seed
-        return connect(q, Q, frame, planner, attempts=ATTEMPTS, seed=seed)
+        cell = self.scene.loaded.cell
+        ways = [goals.way[k] for k in np.argsort(goals.frame, kind="stable")]
+        dof = self.scene.robot.dof
+
+        def of_ways(value: Callable[[FloatArray], FloatArray]) -> FloatArray:
+            return np.array([value(way) for way in ways]).reshape(-1, dof)
+
+        return connect(
+            q,
+            Goals(
+                Q=of_ways(lambda way: way[0]),
+                frame=np.sort(np.array(goals.frame, np.int64)),
+                low=of_ways(lambda way: way.min(axis=0)),
+                high=of_ways(lambda way: way.max(axis=0)),
+            ),
+            self.scene.motions,
+            effort(cell.roadmap),
+            seed=cell.seed,
+        )
 
     def _score(self, connection: Connection) -> PoseScore:
         sample = self._sample
         length = np.full(len(self.T), np.inf)
         roadmap = connection.roadmap
-        to_goals = roadmap.shortest_paths().length_rad[1 : len(roadmap.frame) + 1]
-        np.minimum.at(length, roadmap.frame, to_goals)
+        paths = roadmap.shortest_paths()
+        to_goals = paths.length_rad[roadmap.shortest_to_goals(paths)]
+        np.minimum.at(length, roadmap.goals.frame, to_goals)
         found = np.isfinite(length)
         return PoseScore(
             score=100.0 * float(sample.weight @ found),
@@ -207,13 +226,20 @@ class PlacedScene:
         )
 
 
+def effort(spec: RoadmapSpec) -> RoadmapSpec:
+    """How hard a score tries, of what a map would."""
+    few = max(1, spec.max_checks // SHARE_OF_CHECKS)
+    return spec.model_copy(update={"max_checks": few, "samples": 0})
+
+
 @dataclass(slots=True, kw_only=True, eq=False)
 class _Goals:
     """Pre-grasps found so far.
 
     Attributes
     ----------
-    q : list of array, shape (dof,)
+    way : list of array, shape (n, dof)
+        Approaches, from the pre-grasp on.
     frame : list of int
         Frame of each.
     tried : int array, shape (frames,)
@@ -224,13 +250,13 @@ class _Goals:
 
     tried: IntArray
     bound: float
-    q: list[FloatArray] = field(default_factory=list)
+    way: list[FloatArray] = field(default_factory=list)
     frame: list[int] = field(default_factory=list)
 
     def copy(self) -> _Goals:
         return _Goals(
             tried=self.tried.copy(),
             bound=self.bound,
-            q=list(self.q),
+            way=list(self.way),
             frame=list(self.frame),
         )

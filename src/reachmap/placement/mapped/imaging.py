@@ -61,7 +61,9 @@ def imaging_configurations(
     T_bin_camera, missing = _views(cell.bin.inner, cell.bin_scan.layers, cell.camera)
     T_base_camera = T_base_bin @ T_bin_camera
     Q, pose = scene.kinematics.solve_many(
-        T_base_camera @ inverse_transform(camera.T_tcp_camera), windings=False
+        T_base_camera @ inverse_transform(camera.T_tcp_camera),
+        windings=False,
+        near=scene.scan_configuration,
     )
     free = scene.checker.free_mask(Q)
     Q, pose = Q[free], pose[free]
