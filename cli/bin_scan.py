@@ -12,8 +12,10 @@ from reachmap.cli.options import (
     DEFAULT_CELL,
     INPUT_FILE,
     cell_option,
+    check_scan_options,
     output_option,
     scan_options,
+    unused,
 )
 from reachmap.cli.text.tables import facts_text
 
@@ -56,6 +58,10 @@ def command(
     from reachmap.tools.bin_scan import bin_scan, estimate_bin_scan, summary_of_bin
     from reachmap.tools.options import RunOptions, written_by
 
+    check_scan_options(shard, executor, dry_run=dry_run)
+    if placement is not None:
+        unused("cell", because="PLACEMENT holds the cell; leave one of them out")
+        cell = None
     workspace = None
     if placement is None and cell is None:
         placement, workspace = _found_here()
@@ -69,7 +75,12 @@ def command(
     )
     if dry_run:
         facts = estimate_bin_scan(
-            placement, cell=cell, workspace=workspace, overrides=overrides, run=run
+            placement,
+            cell=cell,
+            workspace=workspace,
+            overrides=overrides,
+            seed=seed,
+            run=run,
         )
     else:
         result = bin_scan(

@@ -12,6 +12,7 @@ from reachmap.cli.options import (
     json_option,
     output_option,
     overwrite_option,
+    unused,
 )
 
 
@@ -42,8 +43,7 @@ def command(
     from reachmap.tools.cells import export_cell, list_cells
 
     if artefact is None:
-        if output is not None or overwrite:
-            raise click.UsageError("--output and --overwrite go with --export.")
+        unused("output", "overwrite", because="needs --export")
         rows = [
             {"name": row.name, "robot": row.robot, "description": row.description}
             for row in list_cells()
@@ -56,6 +56,8 @@ def command(
             name, robot = row["name"].ljust(widths[0]), row["robot"].ljust(widths[1])
             click.echo(f"{name}  {robot}  {row['description']}")
         return
+    if output is None:
+        unused("overwrite", because="needs --output")
     text = export_cell(artefact, output=output, overwrite=overwrite)
     if as_json:
         target = None if output is None else str(output)

@@ -13,6 +13,7 @@ from reachmap.cli.options import (
     OUTPUT_PATH,
     json_option,
     overwrite_option,
+    unused,
 )
 
 
@@ -70,6 +71,8 @@ def command(
 
     Example: reachmap compare bin.h5 slim/bin.h5 --fail-under -0.5
     """
+    if picture is None:
+        unused("overwrite", because="needs --picture")
     from reachmap.cli.text.compare import compare_text
     from reachmap.tools.compare import compare, draw
 

@@ -34,6 +34,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import click
+from click.core import ParameterSource
 
 from reachmap.cli.failures import RunState
 
@@ -198,6 +199,38 @@ def output_option(
     )
 
 
+def given(*names: str) -> list[str]:
+    """Those of some parameters that stand on the command line, as they are written."""
+    ctx = click.get_current_context()
+    return [
+        parameter.opts[-1] if parameter.param_type_name == "option" else
+        parameter.make_metavar(ctx)
+        for parameter in ctx.command.params
+        if parameter.name in names
+        and ctx.get_parameter_source(parameter.name) is ParameterSource.COMMANDLINE
+    ]  # fmt: skip
+
+
+def unused(*names: str, because: str) -> None:
+    """Refuse options that stand on the command line and would change nothing.
+
+    Parameters
+    ----------
+    *names : str
+        Parameters of the command that is running.
+    because : str
+        End of the sentence that the options begin, as in ``"needs --cell"``.
+
+    Raises
+    ------
+    click.UsageError
+        One of them is there. Values from the environment are for many commands and
+        may go unused.
+    """
+    if found := given(*names):
+        raise click.UsageError(f"{', '.join(found)}: {because}.")
+
+
 def compose(*decorators: Decorator[Any]) -> Decorator[Any]:
     """Join decorators into one; their options appear in the order given."""
 
@@ -221,6 +254,23 @@ scan_options = compose(
     progress_option,
     json_option,
 )
+
+
+def check_scan_options(
+    shard: tuple[int, int] | None, executor: str, *, dry_run: bool
+) -> None:
+    """Refuse options of a scan that would change nothing."""
+    if shard is not None:
+        unused("overwrite", because="a shard leaves a store, which --restart discards")
+    if dry_run:
+        unused("overwrite", "restart", because="--dry-run writes nothing")
+    check_workers(executor)
+
+
+def check_workers(executor: str) -> None:
+    """Refuse a number of workers for a cluster that has its own."""
+    if executor.startswith("dask:tcp:"):
+        unused("workers", because="the workers are those of the cluster")
 
 
 FORMATS = (

@@ -12,6 +12,7 @@ import click
 from reachmap.cli.options import (
     INPUT_FILE,
     OUTPUT_PATH,
+    check_workers,
     compose,
     executor_option,
     json_option,
@@ -20,6 +21,7 @@ from reachmap.cli.options import (
     progress_option,
     seed_option,
     set_option,
+    unused,
     workers_option,
 )
 
@@ -150,6 +152,11 @@ def command(
 
     Example: reachmap place-bin workspace.h5 --fix z=0 --region 0.2 0.8 -0.5 0.5
     """
+    if bin_pose is not None:
+        unused(
+            "rule", "fixed", "region", "heights", because="--bin-pose is not searched"
+        )
+    check_workers(executor)
     from reachmap.tools.options import RunOptions
     from reachmap.tools.place_bin import PlacementChoice, place_bin, placement_facts
 

@@ -99,6 +99,7 @@ def command(
       network | reachmap rank - --top 10 | robot
       reachmap rank grasps.json --explain NW-12
     """
+    _check_options(cell, output, chart, explain)
     from reachmap.cli.text.rank import ranking_tables
     from reachmap.ranking.lookup.settings import CostBasis, RankSettings
     from reachmap.tools.rank import ListFormat, rank
@@ -131,3 +132,17 @@ def command(
         answer.text if to_stdout else ranking_tables(answer.ranked, top)
     )
     click.echo(text.rstrip("\n"))
+
+
+def _check_options(
+    cell: str | None, output: Path | None, chart: Path | None, explain: str | None
+) -> None:
+    """Refuse options that would change nothing."""
+    if cell is None:
+        options.unused("overrides", "force", because="needs --cell")
+    if chart is None:
+        options.unused("chart_top", because="needs --chart")
+    if chart is None and (output is None or str(output) == "-"):
+        options.unused("overwrite", because="needs --output or --chart")
+    if explain is not None and output is None:
+        options.unused("top", because="--explain tells of one grasp")

@@ -95,6 +95,11 @@ def command(
       reachmap validate bin.h5 grasps.json --chart validation.png
       reachmap validate bin.h5 --random 500 -o results.json
     """
+    if not grasps:
+        options.unused("format_name", "frame", because="needs GRASPS")
+    if output is None and chart is None:
+        options.unused("overwrite", because="needs --output or --chart")
+    options.check_workers(executor)
     from reachmap.cli.text.validate import validation_text
     from reachmap.ranking.lookup.settings import CostBasis, RankSettings
     from reachmap.tools.options import RunOptions

@@ -87,6 +87,12 @@ def command(
 
     Example: reachmap view bin.h5 --html bin-3d.html
     """
+    if page is None:
+        options.unused("overwrite", because="needs --html")
+        if len(test_grasps) > 1:
+            raise click.UsageError("--path: the live view begins with one; see --html.")
+    else:
+        options.unused("host", "port", "open_browser", because="--html has no server")
     from reachmap.tools.view import ViewOptions, view
 
     written = view(

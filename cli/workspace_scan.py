@@ -7,7 +7,12 @@ from pathlib import Path
 
 import click
 
-from reachmap.cli.options import cell_argument, output_option, scan_options
+from reachmap.cli.options import (
+    cell_argument,
+    check_scan_options,
+    output_option,
+    scan_options,
+)
 from reachmap.cli.text.tables import facts_text
 
 
@@ -52,6 +57,7 @@ def command(
 
     Example: reachmap workspace-scan ur5-eye-in-hand --seed 7
     """
+    check_scan_options(shard, executor, dry_run=dry_run)
     from reachmap.tools.options import RunOptions, written_by
     from reachmap.tools.workspace_scan import (
         estimate_workspace_scan,
@@ -69,7 +75,12 @@ def command(
     )
     if dry_run:
         facts = estimate_workspace_scan(
-            cell, method=method, overrides=overrides, run=run
+            cell,
+            method=method,
+            with_bin=with_bin,
+            overrides=overrides,
+            seed=seed,
+            run=run,
         )
     else:
         result = workspace_scan(

@@ -64,7 +64,9 @@ def here(maps: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def test_an_input_that_is_no_file(command: str, name: str, here: Path) -> None:
     """It is named back, without a traceback, and nothing is written."""
     before = sorted(here.iterdir())
-    more = {"merge": ("-o", "new.h5"), "validate": ("grasps.json",)}
+    new = ("-o", "new.h5")
+    more = dict.fromkeys(("merge", "workspace-scan", "bin-scan"), new)
+    more["validate"] = ("grasps.json",)
     arguments = (name, *more.get(command, ()))
     if command == "compare":
         arguments = (name, "bin.h5")

@@ -30,6 +30,7 @@ from reachmap.tools.prologue import (
     check_scan_output,
     path_of_cell,
     refuse_cell_files,
+    shards_of,
 )
 
 if TYPE_CHECKING:
@@ -148,11 +149,12 @@ def estimate_bin_scan(
     *,
     cell: str | None,
     workspace: Path | None = None,
-    overrides: Sequence[str],
-    run: RunOptions,
+    overrides: Sequence[str] = (),
+    seed: int | None = None,
+    run: RunOptions = IN_PROCESS,
 ) -> dict[str, Any]:
     """Say what a scan would do, timed on a few test grasps; nothing is written."""
-    loaded, _ = load_placed_cell(placement, cell, overrides, workspace)
+    loaded, _ = load_placed_cell(placement, cell, with_seed(overrides, seed), workspace)
     scene = Scene.build(loaded, with_bin=True)
     scene.require_free_scan_configuration()
     grid = _grid(loaded, scene)
@@ -167,7 +169,7 @@ def estimate_bin_scan(
         "cell": loaded.cell.name,
         "test_grasps": grid.size,
         "plans": grid.size * loaded.cell.bin_scan.repeats,
-        "estimated_s": round(seconds / run.workers, 1),
+        "estimated_s": round(seconds / run.workers / shards_of(run), 1),
     }
 
 

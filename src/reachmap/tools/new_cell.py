@@ -104,8 +104,10 @@ def new_cell(
     CellError, SettingsError, OutputError
         The URDF cannot be used, a link does not exist, or nothing can be written.
     """
-    target = check_output(output, overwrite=overwrite)
+    target = check_output(output, overwrite=overwrite, inputs=[urdf])
     folder = target.parent
+    srdf_target = target.with_suffix(".srdf")
+    check_output(srdf_target, overwrite=True, inputs=[urdf])
     source = read_source(
         urdf,
         folder,
@@ -113,11 +115,13 @@ def new_cell(
         xacro_args=xacro_args or {},
         moveit_config=moveit_config,
     )
+    inputs = [folder / name for name in (source.srdf, source.joint_limits) if name]
+    check_output(target, overwrite=overwrite, inputs=inputs)
     attempt = _Attempt(folder, source, _first_choices(source, base, tip))
     problems = attempt.refine()
     choices = attempt.choices
     if attempt.srdf:
-        srdf_target = target.with_suffix(".srdf")
+        check_output(srdf_target, overwrite=overwrite, inputs=inputs)
         publish(srdf_target, [attempt.srdf.encode()], overwrite=overwrite)
         choices = replace(choices, srdf=srdf_target.name)
     publish(output, [starter_text(choices).encode()], overwrite=overwrite)

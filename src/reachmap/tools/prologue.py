@@ -31,6 +31,11 @@ def check_scan_output(
     check_outputs([target], overwrite=run.overwrite or resumes, inputs=inputs)
 
 
+def shards_of(run: RunOptions) -> int:
+    """Shares that the work of a run is split into."""
+    return 1 if run.shard is None else run.shard[1]
+
+
 def path_of_cell(name_or_path: str | None) -> Path | None:
     """File of a cell, shipped or not; None where no cell is named or there is none."""
     with suppress(CellError):

@@ -36,6 +36,7 @@ from reachmap.tools.prologue import (
     check_scan_output,
     path_of_cell,
     refuse_cell_files,
+    shards_of,
 )
 
 if TYPE_CHECKING:
@@ -83,13 +84,7 @@ def workspace_scan(
     ReachmapError
         See :mod:`reachmap.errors`.
     """
-    if method not in METHODS:
-        raise SettingsError(f"method {method!r}: expected {' or '.join(METHODS)}")
-    if method == "roadmap" and run.shard is not None:
-        raise SettingsError(
-            "--shard splits the per-frame method; the roadmap method looks at all "
-            "frames together (leave out --shard, or add --method per-frame)"
-        )
+    _check_method(method, run)
     check_scan_output(output, run, [path_of_cell(cell)])
     loaded = read_cell(cell, with_seed(overrides, seed))
     refuse_cell_files([output], loaded)
@@ -150,6 +145,16 @@ def _survey_context(loaded: LoadedCell, *, with_bin: bool) -> SurveyContext:
     )
 
 
+def _check_method(method: str, run: RunOptions) -> None:
+    if method not in METHODS:
+        raise SettingsError(f"method {method!r}: expected {' or '.join(METHODS)}")
+    if method == "roadmap" and run.shard is not None:
+        raise SettingsError(
+            "--shard splits the per-frame method; the roadmap method looks at all "
+            "frames together (leave out --shard, or add --method per-frame)"
+        )
+
+
 def _settings(scene: Scene, method: str) -> dict[str, Any]:
     cell = scene.loaded.cell
     how = (
@@ -181,11 +186,18 @@ def summary_of_workspace(workspace: WorkspaceMap | None) -> dict[str, Any]:
 
 
 def estimate_workspace_scan(
-    cell: str, *, method: str, overrides: Sequence[str], run: RunOptions
+    cell: str,
+    *,
+    method: str,
+    with_bin: bool = False,
+    overrides: Sequence[str] = (),
+    seed: int | None = None,
+    run: RunOptions = IN_PROCESS,
 ) -> dict[str, Any]:
     """Say what a scan would do, timed on a few frames; nothing is written."""
-    loaded = read_cell(cell, overrides)
-    scene = Scene.build(loaded, with_bin=False)
+    _check_method(method, run)
+    loaded = read_cell(cell, with_seed(overrides, seed))
+    scene = Scene.build(loaded, with_bin=with_bin)
     scene.require_free_scan_configuration()
     poses = np.concatenate(
         [
@@ -202,7 +214,7 @@ def estimate_workspace_scan(
     else:
         connect_survey(scene, survey_frames(scene, poses[rows], 0.0), seed=0)
     seconds = (time.perf_counter() - begin) / len(rows) * len(poses)
-    workers = run.workers if method == "per-frame" else 1
+    workers = run.workers * shards_of(run) if method == "per-frame" else 1
     return {
         "cell": loaded.cell.name,
         "method": method,

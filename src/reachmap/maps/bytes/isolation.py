@@ -27,7 +27,7 @@ from reachmap.maps.bytes.integrity import reason_against
 
 Found = TypeVar("Found")
 
-CPU_LIMIT_S = 5.0
+CPU_LIMIT_S = 2.0
 """Time that reading may take [s]; a map of 3 MB takes 0.1 s."""
 
 SECONDS_PER_BYTE = 0.5e-6

@@ -134,7 +134,12 @@ def _imported(
             f"{source}: a list of the format {name} does not name a frame of the cell: "
             "say with --frame which one its poses are in (bin, robot_base, world, …)"
         )
-    if approach_axis is not None and "approach_axis" in document:
+    if approach_axis is not None:
+        if "approach_axis" not in document:
+            raise SettingsError(
+                f"{source}: a list of the format {name} gives directions, to which "
+                f"{approach_axis} as the approach axis says nothing"
+            )
         document = {**document, "approach_axis": approach_axis}
     header = {"format": FORMAT, "format_version": "1.0", "frame": frame}
     origin = {**document.get("source", {}), "imported_from": name}
