@@ -46,7 +46,7 @@ def robot(urdf: str, tcp: dict[str, object] | str, **spec: object) -> RobotModel
     spec.setdefault("limits", {"acceleration_rad_s2": 5.0})
     tcp = {"parent": tcp} if isinstance(tcp, str) else tcp
     description = RobotSpec.model_validate({"urdf": "arm.urdf", "tcp": tcp, **spec})
-    return RobotModel.from_spec(description, urdf=urdf, package_dirs=[str(SHARE)])
+    return RobotModel.from_spec(description, urdf=urdf)
 
 
 def ur5(*, half_turn: bool = False, **spec: object) -> RobotModel:

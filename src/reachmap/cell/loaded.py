@@ -16,7 +16,7 @@ from xml.sax.saxutils import quoteattr, unescape
 from reachmap._typing import FloatArray
 from reachmap.cell.files.files import body_key
 from reachmap.cell.files.joint_limits import MoveItLimits
-from reachmap.cell.files.resources import NotFoundError, Resolver, search_folders
+from reachmap.cell.files.resources import NotFoundError, Resolver
 from reachmap.cell.files.urdf import UrdfDescription, parse_urdf
 from reachmap.cell.model.cell import Cell, ScanConfiguration
 from reachmap.cell.model.fields import PoseSpec
@@ -81,29 +81,9 @@ class LoadedCell:
         return plain.around(self.cell.robot.urdf)
 
     @property
-    def package_dirs(self) -> tuple[str, ...]:
-        """Folders in which an engine may look for ``package://NAME``."""
-        named = [
-            (self.directory / folder).parent
-            for name, folder in self.cell.resources.packages.items()
-            if Path(folder).name == name
-        ]
-        return tuple(str(folder) for folder in [*named, *search_folders()])
-
-    @property
     def robot(self) -> UrdfDescription:
         """Structure of the URDF."""
         return parse_urdf(self.urdf, self.cell.robot.urdf)
-
-    @property
-    def urdf_for_engine(self) -> str:
-        """URDF text with every collision mesh as an absolute path.
-
-        ``resources.packages`` may give a package a folder of another name, which no
-        list of package folders can express; this text needs none.
-        """
-        paths = {name: str(path) for name, path in self.mesh_paths.items()}
-        return _with_filenames(self.urdf, paths)
 
     @property
     def scan_configuration_rad(self) -> dict[str, float]:

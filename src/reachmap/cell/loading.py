@@ -104,6 +104,7 @@ def cell_from_text(
         check_names(document, files.robot, files.srdf_description)
     warnings = find_doubts(document, cell, files) if cell is not None else ()
     warnings += tuple(line for e in files.expansions for line in e.warnings)
+    warnings = (*files.notes, *warnings)
     document.raise_mistakes()
     if cell is None or files.robot is None:
         raise CellError(f"{label}: cannot be loaded")

@@ -10,11 +10,13 @@ import difflib
 from collections.abc import Collection
 from typing import Any
 
+from reachmap.cell.files.collisions import mesh_scales
 from reachmap.cell.files.files import CellFiles, body_key
 from reachmap.cell.files.srdf import SrdfDescription
 from reachmap.cell.files.urdf import UrdfDescription
 from reachmap.cell.model.cell import Cell
-from reachmap.cell.model.fields import MAX_LENGTH_M, Shape
+from reachmap.cell.model.fields import MAX_LENGTH_M
+from reachmap.cell.model.shapes import sides
 from reachmap.cell.text.data import at, entries, text_at
 from reachmap.cell.text.messages import did_you_mean
 from reachmap.cell.text.yaml_reader import Document, Location
@@ -193,13 +195,15 @@ def _check_scan_configuration(document: Document, moving: tuple[str, ...]) -> No
 
 DOUBTFUL_M = 10.0
 TINY_M = 1e-3
+# Below it, areas and volumes are lost in the rounding of coordinates.
+NO_SIZE_M = 1e-9
 
 
 def find_doubts(document: Document, cell: Cell, files: CellFiles) -> tuple[str, ...]:
-    """Sentences about sizes above 10 m or below 1 mm.
+    """Sentences about links that cannot collide, and sizes above 10 m or below 1 mm.
 
-    A mesh larger than 100 m is a mistake of the document rather than a doubt, except
-    in COLLADA, whose node transforms are not followed here.
+    A mesh larger than 100 m, or of no size, is a mistake of the document rather than a
+    doubt; so is an arm that can be seen, but not collide.
     """
     doubts: list[str] = []
     for index, body in enumerate(cell.bodies):
@@ -210,32 +214,42 @@ def find_doubts(document: Document, cell: Cell, files: CellFiles) -> tuple[str, 
             scale = mesh.scale if isinstance(mesh.scale, tuple) else (mesh.scale,) * 3
             label = f"mesh of body {body.name!r}"
             doubts += _mesh_doubts(document, files, key, label, scale, location)
-        elif largest_side(body.shape) > DOUBTFUL_M:
-            side = largest_side(body.shape)
+        elif (side := float(sides(body.shape).max())) > DOUBTFUL_M:
             doubts.append(_large(document, location, f"body {body.name!r}", side))
     if max(cell.bin.inner) > DOUBTFUL_M:
         where: Location = ("bin", "inner")
         doubts.append(_large(document, where, "the bin", max(cell.bin.inner)))
     if files.robot is not None:
-        for name, scale in files.robot.mesh_scales.items():
+        doubts += _links_unchecked(document, cell, files.robot)
+        for name, scale in mesh_scales(files.robot.collisions).items():
             label = f"URDF mesh {name.rsplit('/', 1)[-1]!r}"
             where = ("robot", "urdf")
             doubts += _mesh_doubts(document, files, name, label, scale, where)
     return tuple(doubts)
 
 
-def largest_side(shape: Shape) -> float:
-    """Largest extent of a primitive [m]; 0 for a mesh."""
-    kind, value = shape.kind()
-    if kind == "box":
-        return float(max(value))
-    if kind == "sphere":
-        return 2.0 * float(value.radius)
-    if kind == "cylinder":
-        return float(max(2.0 * value.radius, value.length))
-    if kind == "capsule":
-        return float(value.length + 2.0 * value.radius)
-    return 0.0
+def _links_unchecked(
+    document: Document, cell: Cell, robot: UrdfDescription
+) -> list[str]:
+    """Name links that can be seen and have no collision shape."""
+    unseen = robot.links_without_collision
+    if not unseen:
+        return []
+    shown = ", ".join(unseen[:12]) + (", …" if len(unseen) > 12 else "")
+    location = ("robot", "urdf")
+    still = {*WORLD, *robot.fixed_to(robot.root)}
+    carried = {*(c.link for c in robot.collisions), *(b.attach_to for b in cell.bodies)}
+    if carried <= still and not still.issuperset(unseen):
+        document.add(
+            location,
+            f"no link that moves has a <collision> element ({shown}: <visual> only), "
+            "so no collision of the arm would be found; add collision shapes to the "
+            "URDF, or to bodies of the cell",
+        )
+        return []
+    return [
+        f"{document.place(location)}: no <collision> element, so never checked: {shown}"
+    ]
 
 
 def _mesh_doubts(
@@ -250,8 +264,10 @@ def _mesh_doubts(
         return []
     sides = files.mesh_sizes[key] * scale
     side = float(max(sides))
-    exact = files.mesh_paths[key].suffix.lower() != ".dae"
-    if side > MAX_LENGTH_M and exact:
+    if side < NO_SIZE_M:
+        document.add(location, f"{label} has no size ({side:.3g} m); check its scale")
+        return []
+    if not side <= MAX_LENGTH_M:
         document.add(
             location,
             f"{label} is {side:,.4g} m large; is it in millimetres? (scale: 0.001)",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import PurePosixPath
 
 from reachmap.cell.loaded import LoadedCell
-from reachmap.cell.model.fields import Shape
+from reachmap.cell.model.shapes import shape_text
 from reachmap.core.collision.solids import SolidCell
 from reachmap.errors import ReachmapError
 from reachmap.maps.format.registry import Artefact
@@ -122,22 +122,9 @@ def _position(xyz: tuple[float, ...]) -> str:
 
 def _bodies(loaded: LoadedCell) -> Block:
     rows = [
-        (body.name, body.attach_to, _shape_words(body.shape), _position(body.pose.xyz))
+        (body.name, body.attach_to, shape_text(body.shape), _position(body.pose.xyz))
         for body in loaded.cell.bodies
     ]
     if not rows:
         return paragraph("None besides the robot and the bin.")
     return table(("body", "fixed to", "shape", "centre there"), rows, "<<<<")
-
-
-def _shape_words(shape: Shape) -> str:
-    kind, value = shape.kind()
-    if kind == "box":
-        return f"box {' × '.join(number(side, 3) for side in value)} m"
-    if kind == "sphere":
-        return f"sphere, radius {number(value.radius, 3, 'm')}"
-    if kind == "mesh":
-        return f"mesh {PurePosixPath(value.file).name}"
-    return (
-        f"{kind}, radius {number(value.radius, 3)}, length {number(value.length, 3)} m"
-    )

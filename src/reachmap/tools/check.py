@@ -9,7 +9,7 @@ import numpy as np
 
 from reachmap._typing import FloatArray
 from reachmap.cell.loading import LoadedCell, read_cell
-from reachmap.cell.model.fields import Shape
+from reachmap.cell.model.shapes import shape_text
 from reachmap.core.scene import Scene
 from reachmap.geometry import AXES
 
@@ -137,18 +137,6 @@ def check_loaded(loaded: LoadedCell) -> CellCheck:
         warnings=loaded.warnings,
         problems=scene.scan_problems(),
     )
-
-
-def shape_text(shape: Shape) -> str:
-    """Shape with its size: ``box 0.24 × 0.24 × 0.8 m``."""
-    kind, value = shape.kind()
-    if kind == "box":
-        return "box " + " × ".join(f"{side:g}" for side in value) + " m"
-    if kind == "sphere":
-        return f"sphere r {value.radius:g} m"
-    if kind == "mesh":
-        return f"mesh {value.file.rsplit('/', 1)[-1]}"
-    return f"{kind} r {value.radius:g} m, length {value.length:g} m"
 
 
 def _joints(scene: Scene) -> tuple[JointRow, ...]:

@@ -101,6 +101,6 @@ def test_planar_bounds_are_the_lengths_of_the_links():
     """For parallel axes in a plane the bound is the stretched length, to a radius."""
     scene = scene_of("planar-toy", with_bin=False)
     bodies = build_geometry(scene.robot, scene.loaded, with_bin=False)
-    bounds = displacement_bounds(scene.robot.model, bodies.geometry).max(axis=0)
+    bounds = displacement_bounds(scene.robot.model, bodies).max(axis=0)
     np.testing.assert_allclose(bounds, [0.7, 0.3, 0.1], atol=0.015)
     assert (bounds >= [0.7, 0.3, 0.1]).all()

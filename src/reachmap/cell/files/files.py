@@ -8,13 +8,15 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from reachmap._typing import FloatArray
+from reachmap.cell.files.collisions import mesh_scales
 from reachmap.cell.files.joint_limits import MoveItLimits, parse_joint_limits
-from reachmap.cell.files.meshes import MeshError, mesh_size
 from reachmap.cell.files.resources import NotFoundError, Resolver
 from reachmap.cell.files.robot_text import robot_text
 from reachmap.cell.files.srdf import SrdfDescription, parse_srdf
 from reachmap.cell.files.urdf import UrdfDescription, parse_urdf
 from reachmap.cell.files.xacro import Expansion
+from reachmap.cell.meshes.reading import MeshError, read_mesh
+from reachmap.cell.model.shapes import sides
 from reachmap.cell.text.data import at, entries, text_at
 from reachmap.cell.text.messages import did_you_mean
 from reachmap.cell.text.yaml_reader import (
@@ -46,6 +48,7 @@ class CellFiles:
     files_sha256: dict[str, str] = field(default_factory=dict)
     mesh_sizes: dict[str, FloatArray] = field(default_factory=dict)
     expansions: list[Expansion] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
 
     def add_mesh(self, key: str, path: Path) -> None:
         """Record a mesh by its key, with its size and the sha256 of its bytes."""
@@ -53,7 +56,7 @@ class CellFiles:
         self.mesh_paths[key] = path
         self.files_sha256[key] = hashlib.sha256(data).hexdigest()
         try:
-            self.mesh_sizes[key] = mesh_size(data, path.suffix)
+            self.mesh_sizes[key] = sides(read_mesh(data, path.suffix))
         except MeshError as error:
             raise CellError(f"mesh {path}: {error}") from None
 
@@ -143,6 +146,7 @@ def _read_urdf(document: Document, files: CellFiles) -> None:
         files.urdf = _text(path, document, files)
         files.urdf_folder, files.urdf_root = path.parent, root
         files.robot = parse_urdf(files.urdf, path.name)
+        files.notes += files.robot.notes
     except (NotFoundError, CellError) as error:
         _add(document, location, error)
 
@@ -184,6 +188,7 @@ def _read_srdf(document: Document, files: CellFiles) -> None:
         path = files.resolver.resolve(reference)
         files.srdf = _text(path, document, files)
         files.srdf_description = parse_srdf(files.srdf, path.name, files.robot)
+        files.notes += files.srdf_description.notes
     except (NotFoundError, CellError) as error:
         _add(document, location, error)
 
@@ -196,7 +201,9 @@ def _read_joint_limits(document: Document, files: CellFiles) -> None:
     try:
         path = files.resolver.resolve(reference)
         text = read_text(path, limit=MAX_TEXT_BYTES)
-        files.joint_limits = parse_joint_limits(text, path.name)
+        limits = parse_joint_limits(text, path.name, files.robot)
+        files.joint_limits = limits.joints
+        files.notes += limits.notes
     except (NotFoundError, CellError) as error:
         _add(document, location, error)
 
@@ -204,7 +211,7 @@ def _read_joint_limits(document: Document, files: CellFiles) -> None:
 def _find_urdf_meshes(document: Document, files: CellFiles) -> None:
     if files.robot is None or files.urdf_folder is None or files.urdf_root is None:
         return
-    for reference in files.robot.collision_meshes:
+    for reference in mesh_scales(files.robot.collisions):
         try:
             path = files.resolver.resolve_from_urdf(
                 reference, files.urdf_folder, files.urdf_root

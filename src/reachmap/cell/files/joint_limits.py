@@ -1,35 +1,58 @@
-"""MoveIt's ``joint_limits.yaml``: limits that tighten those of the URDF."""
+"""MoveIt's ``joint_limits.yaml``: limits that tighten those of the URDF.
+
+Read as MoveIt reads it: each side of a range counts by itself, a number counts unless
+its ``has_…_limits`` says no, ``!degrees`` and ``!radians`` are units.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
-from reachmap.cell.files.urdf import UrdfDescription
+from reachmap.cell.files.urdf import UrdfDescription, UrdfJoint, full_turn
 from reachmap.cell.text.yaml_reader import Document, parse_yaml
 from reachmap.errors import CellError
 
 MoveItLimits = dict[str, float | bool]
 _RATES = (("velocity_rad_s", "velocity"), ("acceleration_rad_s2", "acceleration"))
 _LARGEST = 1e6
+_TAGS = {"!degrees": math.radians, "!radians": float}
+# As yaml-cpp and rospy read them; YAML 1.2 knows only true and false.
+_FLAGS = {"yes": True, "on": True, "true": True, "y": True} | {
+    "no": False, "off": False, "false": False, "n": False,
+}  # fmt: skip
 
 
-def parse_joint_limits(text: str, source: str) -> dict[str, MoveItLimits]:
-    """Read a MoveIt file.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MoveItFile:
+    """What a joint limits file says.
 
-    Returns
-    -------
-    dict
+    Attributes
+    ----------
+    joints : dict
         Joint name to its ``has_*_limits`` and ``max_*``/``min_*`` entries, with
         only the limits that are switched on [rad/s, rad/s², rad; m for prismatic].
+    notes : tuple of str
+        What is not used, in words.
+    """
+
+    joints: dict[str, MoveItLimits] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+
+
+def parse_joint_limits(
+    text: str, source: str, robot: UrdfDescription | None
+) -> MoveItFile:
+    """Read a MoveIt file, and note names that are no joints of the robot.
 
     Raises
     ------
     CellError
         Every mistake with file, line and column.
     """
-    document = parse_yaml(text, source)
+    document = parse_yaml(text, source, _TAGS)
     data = document.data
     table = data.get("joint_limits") if isinstance(data, dict) else None
     if not isinstance(table, dict):
@@ -37,7 +60,28 @@ def parse_joint_limits(text: str, source: str) -> dict[str, MoveItLimits]:
         raise CellError(f"{place}: expected a mapping joint_limits: {{joint: {{…}}}}")
     limits = {name: _one(document, name, entry) for name, entry in table.items()}
     document.raise_mistakes()
-    return limits
+    notes = _scaling_notes(document)
+    known = limits if robot is None else robot.joints
+    unknown = [name for name in limits if name not in known]
+    if unknown:
+        place = document.place(("joint_limits", unknown[0]), of_key=True)
+        shown = ", ".join(unknown[:10]) + (", …" if len(unknown) > 10 else "")
+        notes.append(f"{place}: not joints of the robot, passed over: {shown}")
+    return MoveItFile(joints=limits, notes=tuple(notes))
+
+
+def _scaling_notes(document: Document) -> list[str]:
+    """Say that MoveIt would drive the arm slower than the limits."""
+    notes = []
+    for kind in ("velocity", "acceleration"):
+        key = f"default_{kind}_scaling_factor"
+        value = document.data.get(key)
+        if value is not None and value != 1:
+            notes.append(
+                f"{document.place((key,))}: {key}: {value!r:.20} is not applied; to "
+                "drive the arm slower give robot.limits.scaling in the cell"
+            )
+    return notes
 
 
 def _one(document: Document, name: str, entry: Any) -> MoveItLimits:
@@ -52,17 +96,22 @@ def _one(document: Document, name: str, entry: Any) -> MoveItLimits:
         ("position", ("min_position", "max_position")),
     ):
         flag = f"has_{kind}_limits"
-        if entry.get(flag) is not True:
-            limits[flag] = False
-            continue
-        for key in keys:
+        given = entry.get(flag, any(key in entry for key in keys))
+        on = _FLAGS.get(str(given).lower())
+        if on is None:
+            document.add((*location, flag), f"expected true or false (got {given!r})")
+        limits[flag] = bool(on)
+        if on and not any(key in entry for key in keys):
+            document.add(location, f"{flag} needs {' or '.join(keys)}")
+        for key in keys if on else ():
+            if key not in entry:
+                continue
             value = _number(entry.get(key), positive=kind != "position")
             if value is None:
                 wanted = "a finite number" + (" > 0" if kind != "position" else "")
                 message = f"expected {wanted} (got {entry.get(key)!r:.60})"
                 document.add((*location, key), message)
             else:
-                limits[flag] = True
                 limits[key] = value
     low, high = limits.get("min_position"), limits.get("max_position")
     if low is not None and high is not None and low >= high:
@@ -109,10 +158,19 @@ def tighten_limits(
         limits[key] = given
     for joint in moving:
         file = table.get(joint, {})
-        if "min_position" not in file or "max_position" not in file:
+        if "min_position" not in file and "max_position" not in file:
             continue
-        turn = robot.joints[joint].type != "prismatic"
-        pair = [float(file["min_position"]), float(file["max_position"])]
-        low, high = (math.degrees(v) for v in pair) if turn else pair
-        own = limits["position_deg"].get(joint, [low, high])
-        limits["position_deg"][joint] = [max(low, own[0]), min(high, own[1])]
+        turns = robot.joints[joint].type != "prismatic"
+        low, high = _range(file, robot.joints[joint])
+        if low is None or high is None:
+            continue  # a slide with one end; the model asks for the other
+        pair = [math.degrees(low), math.degrees(high)] if turns else [low, high]
+        own = limits["position_deg"].get(joint, pair)
+        limits["position_deg"][joint] = [max(pair[0], own[0]), min(pair[1], own[1])]
+
+
+def _range(file: MoveItLimits, joint: UrdfJoint) -> tuple[float | None, float | None]:
+    """Ends of the file, or of the URDF where the file gives none [rad or m]."""
+    low = file.get("min_position", joint.lower)
+    high = file.get("max_position", joint.upper)
+    return (low, high) if joint.type == "prismatic" else full_turn(low, high)

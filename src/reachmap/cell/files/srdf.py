@@ -1,8 +1,10 @@
-"""The parts of an SRDF that a cell uses: groups and group states."""
+"""The parts of an SRDF that a cell uses: groups, states and disabled pairs."""
 
 from __future__ import annotations
 
 import math
+import re
+from collections.abc import Iterator
 from dataclasses import dataclass
 from xml.etree import ElementTree
 
@@ -21,13 +23,30 @@ class SrdfDescription:
         Group name to joint names.
     states : dict
         State name to joint positions [rad or m].
+        Those of joints with several values, as virtual ones have, are left out.
     disabled_pairs : tuple of (str, str)
         Links whose collisions are ignored.
+    disabled_links : tuple of str
+        Links that are checked against no other link but those of `enabled_pairs`.
+    enabled_pairs : tuple of (str, str)
+    notes : tuple of str
+        What is not used, in words.
     """
 
     groups: dict[str, tuple[str, ...]]
     states: dict[str, dict[str, float]]
-    disabled_pairs: tuple[tuple[str, str], ...]
+    disabled_pairs: tuple[tuple[str, str], ...] = ()
+    disabled_links: tuple[str, ...] = ()
+    enabled_pairs: tuple[tuple[str, str], ...] = ()
+    notes: tuple[str, ...] = ()
+
+    def ignores(self, first: str, second: str) -> bool:
+        """Whether two links are not to be checked against each other."""
+        ways = {(first, second), (second, first)}
+        if ways & set(self.enabled_pairs):
+            return False
+        by_default = first in self.disabled_links or second in self.disabled_links
+        return by_default or bool(ways & set(self.disabled_pairs))
 
 
 def parse_srdf(text: str, label: str, robot: UrdfDescription) -> SrdfDescription:
@@ -36,7 +55,8 @@ def parse_srdf(text: str, label: str, robot: UrdfDescription) -> SrdfDescription
     Raises
     ------
     CellError
-        The text is not an SRDF, or a state holds something else than finite numbers.
+        The text is not an SRDF, a state holds something else than finite numbers, or
+        a pair lacks a link.
     """
     root = parse_xml(text, label)
     if root.tag != "robot":
@@ -52,11 +72,62 @@ def parse_srdf(text: str, label: str, robot: UrdfDescription) -> SrdfDescription
         element.get("name", ""): _state(element, label)
         for element in root.findall("group_state")
     }
-    pairs = tuple(
-        (element.get("link1", ""), element.get("link2", ""))
-        for element in root.findall("disable_collisions")
+    faults: list[str] = []
+    found = {
+        tag: [
+            tuple(_attribute(element, key, where, faults) for key in keys)
+            for where, element in _placed(root, tag, text, label)
+        ]
+        for tag, keys in _PAIR_ELEMENTS.items()
+    }
+    if faults:
+        raise CellError(faults)
+    named = {link for rows in found.values() for row in rows for link in row}
+    unknown = sorted(named - set(robot.links))
+    shown = ", ".join(unknown[:10]) + (", …" if len(unknown) > 10 else "")
+    note = f"{label}: collisions of links that the URDF lacks, passed over: {shown}"
+    return SrdfDescription(
+        groups=groups,
+        states=states,
+        disabled_pairs=tuple((a, b) for a, b in found["disable_collisions"]),
+        disabled_links=tuple(a for (a,) in found["disable_default_collisions"]),
+        enabled_pairs=tuple((a, b) for a, b in found["enable_collisions"]),
+        notes=(note,) if unknown else (),
     )
-    return SrdfDescription(groups=groups, states=states, disabled_pairs=pairs)
+
+
+_PAIR_ELEMENTS = {
+    "disable_collisions": ("link1", "link2"),
+    "enable_collisions": ("link1", "link2"),
+    "disable_default_collisions": ("link",),
+}
+
+
+def _placed(
+    root: ElementTree.Element, tag: str, text: str, label: str
+) -> Iterator[tuple[str, ElementTree.Element]]:
+    """Elements directly below the root, each with file and line."""
+    # ElementTree forgets lines; the n-th start tag that is no comment is its own.
+    starts = [
+        match.start(1)
+        for match in re.finditer(rf"<!--.*?-->|<({tag})(?=[\s/>])", text, re.DOTALL)
+        if match[1]
+    ]
+    elements = list(root.iter(tag))
+    for element in root.findall(tag):
+        number = elements.index(element)
+        exact = len(starts) == len(elements)
+        line = text.count("\n", 0, starts[number]) + 1 if exact else 0
+        yield (f"{label}:{line}" if exact else label), element
+
+
+def _attribute(
+    element: ElementTree.Element, key: str, where: str, faults: list[str]
+) -> str:
+    value = element.get(key, "")
+    if not value:
+        faults.append(f"{where}: <{element.tag}> needs {key}")
+    return value
 
 
 def _group_joints(
@@ -87,9 +158,12 @@ def _state(element: ElementTree.Element, label: str) -> dict[str, float]:
     for joint in element.findall("joint"):
         name, text = joint.get("name", ""), joint.get("value", "")
         try:
-            value = float(text)
+            numbers = [float(word) for word in text.split()]
         except ValueError:
-            value = math.nan
+            numbers = []
+        if len(numbers) > 1:  # a virtual or planar joint, which no arm plans for
+            continue
+        value = numbers[0] if numbers else math.nan
         if not math.isfinite(value):
             raise CellError(
                 f"{label}: group_state {element.get('name')!r}: joint {name!r}: "

@@ -1,8 +1,7 @@
-"""What the loader must know of a URDF before an engine reads it.
+"""What a URDF says of links, joints, limits and collision shapes.
 
-Links, joints, limits and mesh references; nothing of geometry or inertia. The same
-text later goes to Pinocchio; faults are found here because this reader can say what
-is wrong in a sentence.
+The joints of the same text later go to Pinocchio; faults are found here because this
+reader can say what is wrong in a sentence.
 """
 
 from __future__ import annotations
@@ -12,8 +11,19 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from xml.etree import ElementTree
 
+import numpy as np
+
+from reachmap._typing import FloatArray
+from reachmap.cell.files.collisions import (
+    NO_ORIGIN,
+    LinkShape,
+    Origin,
+    links_without_collision,
+    read_collisions,
+)
 from reachmap.cell.files.xml_text import parse_xml
 from reachmap.errors import CellError
+from reachmap.geometry import inverse_transform
 
 MAX_URDF_BYTES = 20_000_000
 MAX_LINKS = 2_000
@@ -31,7 +41,11 @@ OTHER_ROOTS = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class UrdfJoint:
-    """One joint. Limits are in rad or m, None where the URDF gives none."""
+    """One joint. Limits are in rad or m, None where the URDF gives none.
+
+    Soft limits count, as they do for MoveIt; infinite ones are none. A joint that
+    mimics another stands at ``multiplier * position(mimics) + offset``.
+    """
 
     name: str
     type: str
@@ -41,6 +55,9 @@ class UrdfJoint:
     upper: float | None = None
     velocity: float | None = None
     mimics: str | None = None
+    multiplier: float = 1.0
+    offset: float = 0.0
+    origin: Origin = NO_ORIGIN
 
     @property
     def moves(self) -> bool:
@@ -50,7 +67,7 @@ class UrdfJoint:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class UrdfDescription:
-    """Links, joints and meshes of a URDF, in the order of the file.
+    """Links, joints and collision shapes of a URDF, in the order of the file.
 
     Attributes
     ----------
@@ -59,20 +76,20 @@ class UrdfDescription:
         Joint name to :class:`UrdfJoint`.
     root : str
         The link that is nobody's child.
-    collision_meshes : tuple of str
-        Mesh references of collision elements, each once.
-    mesh_scales : dict
-        Those references to their largest scale per axis.
-    visual_meshes : tuple of str
+    collisions : tuple of LinkShape
+    links_without_collision : tuple of str
+        Links that can be seen, but have no collision element.
+    notes : tuple of str
+        What is not used, in words.
     """
 
     name: str
     links: tuple[str, ...]
     joints: dict[str, UrdfJoint]
     root: str
-    collision_meshes: tuple[str, ...]
-    visual_meshes: tuple[str, ...]
-    mesh_scales: dict[str, tuple[float, float, float]]
+    collisions: tuple[LinkShape, ...] = ()
+    links_without_collision: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
 
     def chain(self, base: str, tip: str) -> tuple[str, ...]:
         """List the moving joints on the way from one frame to another, base first.
@@ -99,6 +116,20 @@ class UrdfDescription:
             link = joint.parent
         yield link, None
 
+    def fixed_to(self, link: str) -> dict[str, FloatArray]:
+        """Poses (4, 4) in a link of all links that fixed joints tie to it."""
+        poses = {link: np.eye(4)}
+        fixed = [joint for joint in self.joints.values() if joint.type == "fixed"]
+        # A link may be reached from either side; each pass adds one or ends it.
+        for _ in fixed:
+            for joint in fixed:
+                T = joint.origin.matrix()
+                if joint.parent in poses and joint.child not in poses:
+                    poses[joint.child] = poses[joint.parent] @ T
+                elif joint.child in poses and joint.parent not in poses:
+                    poses[joint.parent] = poses[joint.child] @ inverse_transform(T)
+        return poses
+
     def leaves(self) -> tuple[str, ...]:
         """Links without children, in the order of the file."""
         parents = {joint.parent for joint in self.joints.values()}
@@ -121,14 +152,17 @@ def parse_urdf(text: str, label: str) -> UrdfDescription:
         raise CellError(
             f"{label}: expected the root element <robot> (got <{root.tag}>){what}"
         )
-    faults: list[str] = []
+    faults: list[str] = _number_faults(root)
+    notes: list[str] = []
     links = [element.get("name", "") for element in root.findall("link")]
-    joints = [_joint(element, faults) for element in root.findall("joint")]
+    if faults:  # joints and collision elements need numbers
+        raise CellError([f"{label}: {fault}" for fault in faults[:50]])
+    joints = [_joint(element, faults, notes) for element in root.findall("joint")]
     faults += _repeated("link", links) + _repeated("joint", [j.name for j in joints])
     if max(len(links), len(joints)) > MAX_LINKS:
         raise CellError(f"{label}: more than {MAX_LINKS:,} links or joints")
     faults += _structure_faults(set(links), joints)
-    faults += _number_faults(root)
+    collisions = read_collisions(root, faults)
     if faults:
         raise CellError([f"{label}: {fault}" for fault in faults[:50]])
     children = {joint.child for joint in joints}
@@ -137,29 +171,31 @@ def parse_urdf(text: str, label: str) -> UrdfDescription:
         links=tuple(links),
         joints={joint.name: joint for joint in joints},
         root=next(link for link in links if link not in children),
-        collision_meshes=_meshes(root, "collision"),
-        visual_meshes=_meshes(root, "visual"),
-        mesh_scales=_scales(root),
+        collisions=collisions,
+        links_without_collision=links_without_collision(root),
+        notes=tuple(f"{label}: {note}" for note in notes),
     )
 
 
-def _joint(element: ElementTree.Element, faults: list[str]) -> UrdfJoint:
+def _joint(
+    element: ElementTree.Element, faults: list[str], notes: list[str]
+) -> UrdfJoint:
     name, kind = element.get("name", ""), element.get("type", "")
     if kind not in JOINT_TYPES:
         faults.append(f"joint {name!r}: unknown type {kind!r}")
     parent, child = element.find("parent"), element.find("child")
-    mimic = element.find("mimic")
-    limit = element.find("limit")
-    lower = upper = velocity = None
-    if limit is not None:
-        velocity = _number(limit, "velocity", name, faults)
-        if kind in ("revolute", "prismatic"):
-            lower = _bound(limit, "lower", name, faults)
-            upper = _bound(limit, "upper", name, faults)
-            if lower is not None and upper is not None and lower > upper:
-                faults.append(f"joint {name!r}: limit {lower:g} is above {upper:g}")
-    elif kind in ("revolute", "prismatic"):
+    limit, mimic = element.find("limit"), element.find("mimic")
+    bounded = kind in ("revolute", "prismatic")
+    if bounded and limit is None and element.find("safety_controller") is None:
         faults.append(f"joint {name!r}: a {kind} joint needs <limit>")
+    lower, upper = _bounds(element, name, faults, notes) if bounded else (None, None)
+    velocity = _number(limit, "velocity", name, faults)
+    factors = [
+        given if (given := _number(mimic, key, name, faults)) is not None else default
+        for key, default in (("multiplier", 1.0), ("offset", 0.0))
+    ]
+    if kind in MOVING:
+        faults += _axis_faults(element, name)
     return UrdfJoint(
         name=name,
         type=kind,
@@ -169,36 +205,76 @@ def _joint(element: ElementTree.Element, faults: list[str]) -> UrdfJoint:
         upper=upper,
         velocity=velocity,
         mimics=None if mimic is None else mimic.get("joint", ""),
+        multiplier=factors[0],
+        offset=factors[1],
+        origin=Origin.of(element),
     )
 
 
+def _bounds(
+    element: ElementTree.Element, name: str, faults: list[str], notes: list[str]
+) -> tuple[float | None, float | None]:
+    """Hard limits, narrowed by the soft limits as MoveIt does."""
+    limit, soft = element.find("limit"), element.find("safety_controller")
+    low, high = (
+        # A limit that is left out is 0, one that is infinite is none.
+        0.0 if limit is not None and key not in limit.attrib
+        else _number(limit, key, name, faults)
+        for key in ("lower", "upper")
+    )  # fmt: skip
+    if low is not None and high is not None and low > high:
+        faults.append(f"joint {name!r}: limit {low:g} is above {high:g}")
+    soft_low = _number(soft, "soft_lower_limit", name, faults)
+    soft_high = _number(soft, "soft_upper_limit", name, faults)
+    lows = [value for value in (low, soft_low) if value is not None]
+    highs = [value for value in (high, soft_high) if value is not None]
+    tight = max(lows, default=None), min(highs, default=None)
+    if (
+        (soft_low is not None or soft_high is not None)
+        and tight[0] is not None
+        and tight[1] is not None
+        and tight[0] >= tight[1]
+    ):
+        notes.append(f"joint {name!r}: the soft limits leave no range and are not used")
+        return low, high
+    return tight
+
+
+def full_turn(low: float | None, high: float | None) -> tuple[float, float]:
+    """Range of a turning joint that lacks an end: one turn, about zero if it can be."""
+    if low is None:
+        low = -math.pi if high is None or high > -math.pi else high - 2 * math.pi
+    if high is None:
+        high = math.pi if low < math.pi else low + 2 * math.pi
+    return low, high
+
+
+def _axis_faults(element: ElementTree.Element, name: str) -> list[str]:
+    axis = element.find("axis")
+    text = "1 0 0" if axis is None else axis.get("xyz", "1 0 0")
+    length = math.hypot(*map(float, text.split()))
+    # Far from 1 its square is no longer a number that an engine can divide by.
+    if 1e-9 < length < 1e9:
+        return []
+    return [f"joint {name!r}: <axis xyz>: expected a direction (got {text[:40]!r})"]
+
+
 def _number(
-    element: ElementTree.Element, key: str, joint: str, faults: list[str]
+    element: ElementTree.Element | None, key: str, joint: str, faults: list[str]
 ) -> float | None:
-    text = element.get(key)
+    """Value of an attribute; None where it is not given or infinite."""
+    text = None if element is None else element.get(key)
     if text is None:
         return None
     try:
         value = float(text)
     except ValueError:
         value = math.nan
-    if math.isinf(value):
-        return None  # as good as not given
-    if math.isfinite(value):
-        return value
-    faults.append(
-        f"joint {joint!r}: {key}: expected a finite number (got {text[:40]!r})"
-    )
+    if not math.isnan(value):
+        return None if math.isinf(value) else value
+    given = repr(text[:40])
+    faults.append(f"joint {joint!r}: {key}: expected a finite number (got {given})")
     return None
-
-
-def _bound(
-    element: ElementTree.Element, key: str, joint: str, faults: list[str]
-) -> float | None:
-    """Position limit: 0 where the URDF omits it, None where it is infinite."""
-    if element.get(key) is None:
-        return 0.0
-    return _number(element, key, joint, faults)
 
 
 def _repeated(kind: str, names: list[str]) -> list[str]:
@@ -242,11 +318,6 @@ _NUMERIC = (
     ("origin", "xyz", 3),
     ("origin", "rpy", 3),
     ("axis", "xyz", 3),
-    ("box", "size", 3),
-    ("cylinder", "radius", 1),
-    ("cylinder", "length", 1),
-    ("sphere", "radius", 1),
-    ("mesh", "scale", 3),
 )
 
 
@@ -267,25 +338,3 @@ def _number_faults(root: ElementTree.Element) -> list[str]:
                     f"(got {text[:40]!r})"
                 )
     return faults
-
-
-def _mesh_elements(
-    root: ElementTree.Element, role: str
-) -> Iterator[ElementTree.Element]:
-    for link in root.findall("link"):
-        for part in link.findall(role):
-            yield from part.iter("mesh")
-
-
-def _meshes(root: ElementTree.Element, role: str) -> tuple[str, ...]:
-    names = (mesh.get("filename", "") for mesh in _mesh_elements(root, role))
-    return tuple(dict.fromkeys(names))
-
-
-def _scales(root: ElementTree.Element) -> dict[str, tuple[float, float, float]]:
-    scales: dict[str, tuple[float, float, float]] = {}
-    for mesh in _mesh_elements(root, "collision"):
-        x, y, z = (abs(float(word)) for word in mesh.get("scale", "1 1 1").split())
-        a, b, c = scales.get(mesh.get("filename", ""), (0.0, 0.0, 0.0))
-        scales[mesh.get("filename", "")] = (max(x, a), max(y, b), max(z, c))
-    return scales

@@ -1,16 +1,17 @@
 """YAML text to plain data, remembering the line and column of every value.
 
 Only what a cell file needs is read: mappings with text keys, lists and scalars of
-the YAML 1.2 core schema. Tags, anchors, aliases and merge keys are refused, so that
-no text can grow, recurse or name a Python type. ``ruamel.yaml`` scans and parses;
-the tree is built here from its events, which keeps all marks.
+the YAML 1.2 core schema. Anchors, aliases, merge keys and all tags but units that the
+caller allows are refused, so that no text can grow, recurse or name a Python type.
+``ruamel.yaml`` scans and parses; the tree is built here from its events, which keeps
+all marks.
 """
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NoReturn
@@ -152,7 +153,9 @@ def read_bytes(path: Path, *, limit: int, label: str | None = None) -> bytes:
     return data
 
 
-def parse_yaml(text: str, source: str) -> Document:
+def parse_yaml(
+    text: str, source: str, tags: Mapping[str, Callable[[float], float]] | None = None
+) -> Document:
     """Parse one YAML document.
 
     Parameters
@@ -160,6 +163,8 @@ def parse_yaml(text: str, source: str) -> Document:
     text : str
     source : str
         Name used in error messages.
+    tags : mapping, optional
+        Tags that numbers may have, ``!degrees`` for example, to what they mean.
 
     Raises
     ------
@@ -170,7 +175,7 @@ def parse_yaml(text: str, source: str) -> Document:
         raise CellError(f"{source}: larger than the limit of {MAX_TEXT_BYTES:,} bytes")
     document = Document(source=source)
     try:
-        _Builder(document).build(YAML(typ="safe", pure=True).parse(text))
+        _Builder(document, tags or {}).build(YAML(typ="safe", pure=True).parse(text))
     except CellError:
         raise  # a ValueError too, which the last clause would wrap
     except MarkedYAMLError as error:
@@ -213,8 +218,11 @@ def scalar_value(text: str) -> str | int | float | bool | None:
 class _Builder:
     """Builds nested data from a stream of parser events."""
 
-    def __init__(self, document: Document) -> None:
+    def __init__(
+        self, document: Document, tags: Mapping[str, Callable[[float], float]]
+    ) -> None:
         self._document = document
+        self._tags = tags
         self._count = 0
 
     def build(self, events: Iterator[Event]) -> None:
@@ -235,11 +243,19 @@ class _Builder:
         self._check(event, depth)
         self._document.places[location] = self._place(event)
         if isinstance(event, ScalarEvent):
+            if event.tag:
+                return self._tagged(event)
             plain = event.implicit[0] and event.style is None
             return scalar_value(event.value) if plain else event.value
         if isinstance(event, SequenceStartEvent):
             return self._sequence(location, events, depth + 1)
         return self._mapping(location, events, depth + 1)
+
+    def _tagged(self, event: Any) -> float:
+        value = scalar_value(event.value)
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            self._refuse(event, f"expected a number after {str(event.tag)[:60]}")
+        return self._tags[str(event.tag)](value)
 
     def _sequence(
         self, location: Location, events: Iterator[Event], depth: int
@@ -269,7 +285,9 @@ class _Builder:
                 self._document.mistakes.append(
                     Mistake(place=place, location=inner, message=message)
                 )
-                _Builder(Document(source=""))._value(next(events), (), events, depth)
+                _Builder(Document(source=""), self._tags)._value(
+                    next(events), (), events, depth
+                )
                 continue
             self._document.key_places[inner] = self._place(event)
             items[key] = self._value(next(events), inner, events, depth)
@@ -283,7 +301,8 @@ class _Builder:
             self._refuse(event, f"nested more than {MAX_DEPTH} levels deep")
         if isinstance(event, AliasEvent) or getattr(event, "anchor", None):
             self._refuse(event, "anchors and aliases are not supported")
-        if getattr(event, "tag", None):
+        tag = getattr(event, "tag", None)
+        if tag and not (isinstance(event, ScalarEvent) and str(tag) in self._tags):
             self._refuse(event, f"tags are not supported (got {str(event.tag)[:60]})")
 
     def _place(self, event: Any) -> Place:

@@ -1,24 +1,31 @@
 """Coal geometry of a cell: links, attached bodies, surroundings and the bin.
 
 Every geometry has the name that users know: a link's name, a body's name from the
-cell, or ``bin bottom`` and ``bin wall +x``. Pairs that may touch are left out.
+cell, or ``bin bottom`` and ``bin wall +x``. Every two of them that can move against
+each other are a pair, but for links that a joint joins and for pairs that may touch.
 """
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-import coal
 import numpy as np
 import pinocchio as pin
 
 from reachmap._typing import FloatArray
+from reachmap.cell.files.collisions import LinkShape
+from reachmap.cell.files.files import body_key
+from reachmap.cell.files.srdf import parse_srdf
+from reachmap.cell.files.urdf import UrdfDescription
+from reachmap.cell.meshes.reading import MeshError, read_mesh
 from reachmap.cell.model.cell import BinSpec
 from reachmap.cell.model.fields import Shape
+from reachmap.cell.model.shapes import Solid
+from reachmap.core.collision.shapes import coal_shape
 from reachmap.core.robot.model import RobotModel
+from reachmap.core.robot.urdf_joints import LINK_MARK
 from reachmap.errors import SceneError
 from reachmap.geometry import transform_from_parts
 
@@ -46,10 +53,13 @@ class BodyGeometry:
     geometry : pinocchio.GeometryModel
     names : tuple of str
         User's name of each geometry object.
+    shapes : tuple of Shape or TriangleMesh
+        What each is made of.
     """
 
     geometry: Any = field(repr=False)
     names: tuple[str, ...]
+    shapes: tuple[Solid, ...] = field(repr=False)
 
     def pair_names(self) -> tuple[str, ...]:
         """``"A | B"`` for each collision pair, in pair order."""
@@ -112,118 +122,113 @@ def build_geometry(
     SceneError
         A mesh cannot be read, or a frame or touch name does not exist.
     """
-    geometry = _link_geometry(robot)
-    _keep_link_pairs(robot.model, geometry, loaded.srdf)
-    builder = _Builder(robot, geometry)
+    builder = _Builder(robot)
+    _add_links(builder, loaded)
     for body in loaded.cell.bodies:
         joint, T_joint_frame = robot.frame_placement(body.attach_to)
-        shape = coal_shape(body.shape, loaded, body.name)
+        shape = _body_shape(loaded, body.name, body.shape)
         builder.add(body.name, joint, T_joint_frame @ body.pose.matrix(), shape)
     if with_bin:
         placements = bin_placements(robot, loaded.cell.bin)
         for box in bin_boxes(loaded.cell.bin):
-            builder.add(box.name, ROOT, placements[box.name], coal.Box(*box.size_m))
+            shape = Shape(box=box.size_m)
+            builder.add(box.name, ROOT, placements[box.name], shape)
     touches = [(body.name, body.touch) for body in loaded.cell.bodies]
     if with_bin:
         touches.append(("bin", loaded.cell.bin.touch))
     builder.allow(touches, with_bin=with_bin)
-    return BodyGeometry(geometry=geometry, names=tuple(builder.names))
+    return BodyGeometry(
+        geometry=builder.geometry,
+        names=tuple(builder.names),
+        shapes=tuple(builder.shapes),
+    )
 
 
-def coal_shape(shape: Shape, loaded: LoadedCell, body: str) -> Any:
-    """Collision geometry of a shape; meshes are loaded as surfaces.
+def _add_links(builder: _Builder, loaded: LoadedCell) -> None:
+    """Add the links in the order of the file, without pairs that need no check."""
+    description = loaded.robot
+    names = []
+    for item in description.collisions:
+        joint, T_joint_link = builder.robot.link_placement(item.link)
+        shape = _link_shape(loaded, item)
+        builder.add(item.link, joint, T_joint_link @ item.origin.matrix(), shape)
+        names.append(item.link)
+    srdf = parse_srdf(loaded.srdf, "SRDF", description) if loaded.srdf else None
+    joined = _joined_links(description)
+    builder.remove(
+        (first, second)
+        for first in names
+        for second in names
+        if frozenset((first, second)) in joined
+        or (srdf is not None and srdf.ignores(first, second))
+    )
 
-    Raises
-    ------
-    SceneError
-        The mesh file cannot be read.
+
+def _joined_links(description: UrdfDescription) -> set[frozenset[str]]:
+    """Pairs of links that one joint joins, and that touch there by design.
+
+    A tool that is fixed to the last link is not joined to the link before it, whatever
+    the number of links between: it can swing into it.
     """
-    kind, value = shape.kind()
-    if kind == "box":
-        return coal.Box(*value)
-    if kind == "sphere":
-        return coal.Sphere(value.radius)
-    if kind == "cylinder":
-        return coal.Cylinder(value.radius, value.length)
-    if kind == "capsule":
-        return coal.Capsule(value.radius, value.length)
-    scale = np.broadcast_to(np.array(value.scale, float), (3,)).copy()
-    path = loaded.resolve(value.file)
+    return {frozenset((j.parent, j.child)) for j in description.joints.values()}
+
+
+def _link_shape(loaded: LoadedCell, item: LinkShape) -> Solid:
+    if item.shape is not None:
+        return item.shape
+    return _read_mesh(loaded, item.mesh, f"link {item.link!r}", item.scale)
+
+
+def _body_shape(loaded: LoadedCell, name: str, shape: Shape) -> Solid:
+    if shape.mesh is None:
+        return shape
+    key = body_key(name, shape.mesh.file)
+    return _read_mesh(loaded, key, f"body {name!r}", shape.mesh.scale)
+
+
+def _read_mesh(loaded: LoadedCell, key: str, owner: str, scale: Any) -> Solid:
+    path = loaded.mesh_paths[key]
     try:
-        mesh = coal.MeshLoader().load(str(path), scale)
-    except Exception as error:
+        return read_mesh(path.read_bytes(), path.suffix).scaled(scale)
+    except (OSError, MeshError) as error:
         raise SceneError(
-            f"body {body!r}: {path.name} cannot be read as a mesh ({error})"
+            f"{owner}: {path.name} cannot be read as a mesh ({error})"
         ) from error
-    if mesh.num_tris == 0:
-        raise SceneError(f"body {body!r}: {path.name} holds no triangles")
-    return mesh
-
-
-def link_name(geometry_name: str) -> str:
-    """Link of a URDF geometry, which Pinocchio numbers: ``forearm_link_0``."""
-    return re.sub(r"_\d+$", "", geometry_name)
-
-
-def _link_geometry(robot: RobotModel) -> Any:
-    try:
-        return pin.buildGeomFromUrdfString(
-            robot.model,
-            robot.urdf,
-            pin.GeometryType.COLLISION,
-            package_dirs=list(robot.package_dirs),
-        )
-    except Exception as error:
-        raise SceneError(
-            f"robot.urdf: collision geometry cannot be built ({error})"
-        ) from error
-
-
-def _keep_link_pairs(model: Any, geometry: Any, srdf: str) -> None:
-    """Pairs of links, but for neighbours in the chain and the SRDF's exceptions."""
-    geometry.addAllCollisionPairs()
-    if srdf:
-        pin.removeCollisionPairsFromXML(model, geometry, srdf)
-    objects = geometry.geometryObjects
-    for pair in list(geometry.collisionPairs):
-        a, b = objects[pair.first].parentJoint, objects[pair.second].parentJoint
-        if model.parents[a] == b or model.parents[b] == a:
-            geometry.removeCollisionPair(pair)
 
 
 class _Builder:
     """Adds bodies one by one, each paired with all that it moves against."""
 
-    def __init__(self, robot: RobotModel, geometry: Any) -> None:
+    def __init__(self, robot: RobotModel) -> None:
         self.robot = robot
-        self.geometry = geometry
-        self.names = [link_name(g.name) for g in geometry.geometryObjects]
+        self.geometry = pin.GeometryModel()
+        self.names: list[str] = []
+        self.shapes: list[Solid] = []
 
-    def add(self, name: str, joint: int, T_joint_body: FloatArray, shape: Any) -> None:
+    def add(
+        self, name: str, joint: int, T_joint_body: FloatArray, shape: Solid
+    ) -> None:
         """Add one body and pair it with everything on other joints."""
         placement = pin.SE3(np.ascontiguousarray(T_joint_body))
-        # Parent frame 0: an SRDF must not reach bodies that stand on the base link.
-        frame = (
-            0
-            if joint == ROOT
-            else self.robot.model.getFrameId(
-                self.robot.model.names[joint], pin.FrameType.JOINT
-            )
-        )
+        # The engine wants names that differ; a link may have several shapes.
         index = self.geometry.addGeometryObject(
-            pin.GeometryObject(name, joint, frame, placement, shape)
+            pin.GeometryObject(
+                f"{len(self.names)} {name}", joint, ROOT, placement, coal_shape(shape)
+            )
         )
         for other in range(index):
             if self.geometry.geometryObjects[other].parentJoint != joint:
                 self.geometry.addCollisionPair(pin.CollisionPair(other, index))
         self.names.append(name)
+        self.shapes.append(shape)
 
     def allow(
         self, touches: Iterable[tuple[str, tuple[str, ...]]], *, with_bin: bool
     ) -> None:
         """Take out the pairs that may touch; ``bin`` stands for its five boxes."""
-        links = {f.name for f in self.robot.model.frames} | {"world", "robot_base"}
-        known = set(self.names) | links | {"bin"}
+        model = self.robot.body_model
+        links = {f.name.removesuffix(LINK_MARK) for f in model.frames}
+        known = {*self.names, *links, "world", "robot_base", "bin"}
         problems = [
             f"body {body!r}: touch names {other!r}, which is neither a link nor a body"
             for body, others in touches
@@ -232,15 +237,21 @@ class _Builder:
         ]
         if problems:
             raise SceneError(problems)
-        allowed = {
-            frozenset(pair)
+        self.remove(
+            pair
             for body, others in touches
             for other in others
             for pair in self._expand(body, other, with_bin=with_bin)
-        }
-        for pair in list(self.geometry.collisionPairs):
-            if frozenset((self.names[pair.first], self.names[pair.second])) in allowed:
-                self.geometry.removeCollisionPair(pair)
+        )
+
+    def remove(self, pairs: Iterable[tuple[str, str]]) -> None:
+        """Take out pairs of names."""
+        allowed = {frozenset(pair) for pair in pairs}
+        # Copied first: a pair is a view that shifts when one before it is removed.
+        numbers = [(pair.first, pair.second) for pair in self.geometry.collisionPairs]
+        for first, second in numbers:
+            if frozenset((self.names[first], self.names[second])) in allowed:
+                self.geometry.removeCollisionPair(pin.CollisionPair(first, second))
 
     def _expand(self, a: str, b: str, *, with_bin: bool) -> Iterable[tuple[str, str]]:
         boxes = [n for n in self.names if with_bin and n.startswith("bin ")]

@@ -9,11 +9,11 @@ import numpy as np
 
 from reachmap._typing import FloatArray
 from reachmap.core.collision.bodies import build_geometry
+from reachmap.core.collision.shapes import convex_hull
 from reachmap.core.collision.static_bodies import (
     PlacedBodies,
     PlacedBody,
     bodies_at,
-    convex_hull,
 )
 from reachmap.geometry import inverse_transform, transform_from_parts
 
@@ -100,5 +100,5 @@ class Camera:
 def _solid(shape: object) -> PlacedBodies:
     """One body at the origin; a mesh, which is a surface, as its convex hull."""
     if isinstance(shape, coal.BVHModelBase):
-        shape = convex_hull(np.asarray(shape.vertices(), float))
+        shape = convex_hull(np.asarray(shape.vertices(), float)) or shape
     return PlacedBodies([PlacedBody(name="", joint=0, shape=shape, T=np.eye(4))])

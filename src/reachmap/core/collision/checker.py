@@ -21,8 +21,9 @@ import pinocchio as pin
 
 from reachmap._typing import BoolArray, FloatArray
 from reachmap.core.collision.bodies import BodyGeometry
-from reachmap.core.collision.displacement import MotionBound, displacement_bounds
-from reachmap.core.collision.never_meet import joints_between, pairs_that_never_meet
+from reachmap.core.collision.displacement import MotionBound
+from reachmap.core.collision.never_meet import PairMotion, pairs_that_never_meet
+from reachmap.core.collision.shapes import convex_hull
 from reachmap.core.robot.chain import SerialChain
 
 if TYPE_CHECKING:
@@ -70,16 +71,16 @@ class CollisionChecker:
         movable: Collection[str] = (),
     ) -> None:
         self.robot = robot
-        self._model = robot.model
+        self._model = robot.body_model
         self._geometry = bodies.geometry
         self._movable = {n: k for k, n in enumerate(bodies.names) if n in movable}
         self.safety_margin_m = safety_margin_m
-        bounds = displacement_bounds(robot.model, bodies.geometry)
+        motion = PairMotion(robot, bodies)
         self._hulls = _with_convex_hulls(bodies.geometry)
         proved = pairs_that_never_meet(
-            robot.model,
+            robot,
             self._hulls,
-            bounds,
+            motion,
             safety_margin_m,
             left_out=frozenset(self._movable.values()),
         )
@@ -95,11 +96,11 @@ class CollisionChecker:
         self._pair_index = np.array(
             [self.body_pairs.index(name) for name in self._pair_names], dtype=np.int64
         )
-        self.reach_m = np.maximum(bounds.max(axis=0, initial=0.0), 1e-9)
+        self.reach_m = np.maximum(motion.bounds.max(axis=0, initial=0.0), 1e-9)
         self.bound = MotionBound(
-            SerialChain.from_robot(robot), robot.model, bodies.geometry, self.reach_m
+            SerialChain.from_robot(robot), robot, bodies, motion.bounds, self.reach_m
         )
-        self._shares = _margin_shares(bodies.geometry, bounds, self.reach_m)
+        self._shares = _margin_shares(bodies.geometry, motion, self.reach_m)
         self.checks = 0
         self._start_engine()
 
@@ -142,7 +143,11 @@ class CollisionChecker:
         """Whether all pairs are further apart than the safety margin."""
         self.checks += 1
         return not pin.computeCollisions(
-            self._model, self._data, self._broadphase, q, True
+            self._model,
+            self._data,
+            self._broadphase,
+            self.robot.body_configuration(q),
+            True,
         )
 
     def is_clear(self, q: FloatArray, distance_m: float) -> bool:
@@ -156,7 +161,11 @@ class CollisionChecker:
             if step >= distance_m:
                 self.checks += 1
                 return not pin.computeCollisions(
-                    self._model, self._data, manager, q, True
+                    self._model,
+                    self._data,
+                    manager,
+                    self.robot.body_configuration(q),
+                    True,
                 )
         return False
 
@@ -167,7 +176,10 @@ class CollisionChecker:
     def touching_pairs(self, q: FloatArray) -> tuple[int, ...]:
         """Indices into ``body_pairs`` of all pairs that touch at q."""
         data = self._base
-        pin.computeCollisions(self._model, self._data, self._geometry, data, q, False)
+        q_bodies = self.robot.body_configuration(q)
+        pin.computeCollisions(
+            self._model, self._data, self._geometry, data, q_bodies, False
+        )
         hits = [
             int(self._pair_index[index])
             for index, result in enumerate(data.collisionResults)
@@ -204,20 +216,19 @@ def _guess_nothing(requests: Any) -> None:
 
 
 def _margin_shares(
-    geometry: Any, bounds: FloatArray, reach_m: FloatArray
+    geometry: Any, motion: PairMotion, reach_m: FloatArray
 ) -> FloatArray:
     """Share of the robot's displacement that can bring each pair together.
 
-    A motion that moves no point further than d moves the outer body of a pair
-    against the inner one by at most ``d · max_j R[outer, j] / reach_j`` over the joints
-    between them; two neighbours at the wrist need not keep the distance that the
-    camera needs from the floor.
+    A motion that moves no point further than d moves the bodies of a pair against
+    each other by at most ``d · max_j R[pair, j] / reach_j`` over the joints between
+    them; two neighbours at the wrist need not keep the distance that the camera needs
+    from the floor.
     """
     shares = []
     for pair in geometry.collisionPairs:
-        joints, outer = joints_between(geometry, pair)
-        between = list(joints)
-        shares.append(float((bounds[outer, between] / reach_m[between]).max()))
+        joints, reach = motion.between(pair)
+        shares.append(float((reach[joints] / reach_m[joints]).max()))
     return np.array(shares)
 
 
@@ -226,10 +237,7 @@ def _with_convex_hulls(geometry: Any) -> Any:
     copy = geometry.copy()
     for body in copy.geometryObjects:
         if isinstance(body.geometry, coal.BVHModelBase):
-            points = coal.StdVec_Vec3s()
-            points.extend(list(np.asarray(body.geometry.vertices(), float)))
-            try:
-                body.geometry = coal.Convex.convexHull(points, True, "Qt")
-            except Exception:  # a flat mesh has no hull; it stays a mesh
-                continue
+            hull = convex_hull(np.asarray(body.geometry.vertices(), float))
+            if hull is not None:  # a flat mesh has none, and stays a mesh
+                body.geometry = hull
     return copy

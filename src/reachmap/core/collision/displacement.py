@@ -11,36 +11,31 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-import coal
 import numpy as np
 
 from reachmap._typing import FloatArray
+from reachmap.cell.model.shapes import box_corners, corner_points
 
 if TYPE_CHECKING:
+    from reachmap.core.collision.bodies import BodyGeometry
     from reachmap.core.robot.chain import SerialChain
-
-_SIGNS: FloatArray = (
-    np.array(np.meshgrid([-1.0, 1.0], [-1.0, 1.0], [-1.0, 1.0])).reshape(3, -1).T
-)
+    from reachmap.core.robot.model import RobotModel
 
 
-def displacement_bounds(model: Any, geometry: Any) -> FloatArray:
+def displacement_bounds(model: Any, bodies: BodyGeometry) -> FloatArray:
     """Bounds R of all bodies and joints, shape (bodies, dof), [m/rad] or [m/m].
 
     Parameters
     ----------
     model : pinocchio.Model
-        A chain: the parent of joint j is joint j − 1.
-    geometry : pinocchio.GeometryModel
+        Its joints are numbered along the tree, and have one degree of freedom each.
+    bodies : BodyGeometry
     """
     axes = [_axis(model, joint) for joint in range(1, model.njoints)]
-    bounds = np.zeros((geometry.ngeoms, model.nv))
-    for row, body in zip(bounds, geometry.geometryObjects, strict=True):
-        if body.parentJoint == 0:
-            continue
-        points = _corner_points(body.geometry)
-        points = points @ body.placement.rotation.T + body.placement.translation
-        _fill_row(row, model, axes, body.parentJoint, points)
+    bounds = np.zeros((bodies.geometry.ngeoms, model.nv))
+    for row, (body, points) in zip(bounds, _bodies_corners(bodies), strict=True):
+        if body.parentJoint > 0:
+            _fill_row(row, model, axes, body.parentJoint, points)
     return bounds
 
 
@@ -55,18 +50,28 @@ class MotionBound:
     Parameters
     ----------
     chain : SerialChain
-    model : pinocchio.Model
-    geometry : pinocchio.GeometryModel
+    robot : RobotModel
+    bodies : BodyGeometry
+    bounds : array, shape (bodies, dof)
+        R of all bodies, those on joints that follow others included.
     reach_m : array, shape (dof,)
         Largest R of each joint.
     """
 
     def __init__(
-        self, chain: SerialChain, model: Any, geometry: Any, reach_m: FloatArray
+        self,
+        chain: SerialChain,
+        robot: RobotModel,
+        bodies: BodyGeometry,
+        bounds: FloatArray,
+        reach_m: FloatArray,
     ) -> None:
         self._chain = chain
         self._reach_m = reach_m
-        self._corners = _corners_by_joint(chain, model, geometry)
+        self._corners = _corners_by_joint(chain, robot.model, bodies)
+        # Of bodies beside the chain nothing better is known than R.
+        beside = [g.parentJoint > chain.dof for g in bodies.geometry.geometryObjects]
+        self._beside_m = bounds[beside].max(axis=0, initial=0.0)
 
     def displacement_m(self, Q: FloatArray, half_change: FloatArray) -> FloatArray:
         """Bound for motions ``Q[k] ± half_change``, any part of them included.
@@ -100,7 +105,7 @@ class MotionBound:
         first = np.sqrt(square.max(axis=(1, 2)))
         size = np.abs(half_change)
         second = size[self._chain.is_revolute].sum() * float(size @ self._reach_m)
-        return np.asarray(first + second)
+        return np.asarray(np.maximum(first + second, size @ self._beside_m))
 
 
 def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
@@ -114,27 +119,36 @@ def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
     return c
 
 
-def _corners_by_joint(chain: SerialChain, model: Any, geometry: Any) -> FloatArray:
+def _bodies_corners(bodies: BodyGeometry) -> list[tuple[Any, FloatArray]]:
+    """Each geometry object with the corners of its shape, in its joint's frame."""
+    return [
+        (
+            body,
+            corner_points(shape) @ body.placement.rotation.T
+            + body.placement.translation,
+        )
+        for body, shape in zip(
+            bodies.geometry.geometryObjects, bodies.shapes, strict=True
+        )
+    ]
+
+
+def _corners_by_joint(
+    chain: SerialChain, model: Any, bodies: BodyGeometry
+) -> FloatArray:
     """Corners of a box around all bodies of each joint, shape (dof, 3, 8).
 
     In the chain's joint frames, whose z is the joint axis.
     """
     frames = chain.joint_rotations(model)
-    corners = np.zeros((chain.dof, 3, len(_SIGNS)))
+    corners = np.zeros((chain.dof, 3, 8))
+    placed = _bodies_corners(bodies)
     for k in range(chain.dof):
-        points = [
-            (
-                _corner_points(body.geometry) @ body.placement.rotation.T
-                + body.placement.translation
-            )
-            @ frames[k]
-            for body in geometry.geometryObjects
-            if body.parentJoint == k + 1
-        ]
+        points = [p @ frames[k] for body, p in placed if body.parentJoint == k + 1]
         if points:
             cloud = np.vstack(points)
             low, high = cloud.min(axis=0), cloud.max(axis=0)
-            corners[k] = ((low + high) / 2 + _SIGNS * (high - low) / 2).T
+            corners[k] = ((low + high) / 2 + box_corners(high - low)).T
     return corners
 
 
@@ -183,24 +197,3 @@ def _largest_travel(model: Any, joint: int) -> float:
     index = model.idx_qs[joint]
     low, high = model.lowerPositionLimit[index], model.upperPositionLimit[index]
     return float(max(abs(low), abs(high)))
-
-
-def _corner_points(shape: Any) -> FloatArray:
-    """Points whose convex hull holds the shape, shape (n, 3)."""
-    if isinstance(shape, coal.BVHModelBase):
-        return np.asarray(shape.vertices(), float).reshape(-1, 3)
-    if isinstance(shape, coal.Box):
-        half = np.asarray(shape.halfSide, float)
-    elif isinstance(shape, coal.Sphere):
-        half = np.full(3, float(shape.radius))
-    elif isinstance(shape, coal.Capsule):
-        half = np.array([shape.radius, shape.radius, shape.halfLength + shape.radius])
-    elif isinstance(shape, coal.Cylinder):
-        half = np.array([shape.radius, shape.radius, shape.halfLength])
-    else:
-        box = shape.aabb_local
-        shape.computeLocalAABB()
-        low, high = np.asarray(box.min_), np.asarray(box.max_)
-        centre, half = (low + high) / 2, (high - low) / 2
-        return np.asarray(centre + _SIGNS * half)
-    return np.asarray(_SIGNS * half)

@@ -9,21 +9,26 @@ here a proof, and such pairs need no check at run time.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pinocchio as pin
 
-from reachmap._typing import FloatArray
+from reachmap._typing import FloatArray, IntArray
+from reachmap.core.collision.displacement import displacement_bounds
+
+if TYPE_CHECKING:
+    from reachmap.core.collision.bodies import BodyGeometry
+    from reachmap.core.robot.model import RobotModel
 
 MAX_JOINTS = 2
 MAX_BOXES = 3000
 
 
 def pairs_that_never_meet(
-    model: Any,
+    robot: RobotModel,
     hulls: Any,
-    bounds: FloatArray,
+    motion: PairMotion,
     margin_m: float,
     *,
     left_out: frozenset[int] = frozenset(),
@@ -32,12 +37,12 @@ def pairs_that_never_meet(
 
     Parameters
     ----------
-    model : pinocchio.Model
+    robot : RobotModel
     hulls : pinocchio.GeometryModel
         Convex bodies that contain the true ones; distances between surfaces of many
         triangles would take too long.
-    bounds : array, shape (bodies, dof)
-        See :func:`reachmap.core.collision.displacement.displacement_bounds`.
+    motion : PairMotion
+        Of the true bodies.
     margin_m : float
         The pair stays further apart than this.
     left_out : frozenset of int
@@ -48,7 +53,7 @@ def pairs_that_never_meet(
     tuple of (int, int)
         Geometry indices.
     """
-    prover = _Prover(model, hulls, bounds, margin_m)
+    prover = _Prover(robot, hulls, motion, margin_m)
     return tuple(
         (pair.first, pair.second)
         for index, pair in enumerate(hulls.collisionPairs)
@@ -56,41 +61,69 @@ def pairs_that_never_meet(
     )
 
 
-def joints_between(geometry: Any, pair: Any) -> tuple[range, int]:
-    """Joints (0-based) that move one body of a pair against the other.
+class PairMotion:
+    """How far the joints of the arm move two bodies against each other.
 
-    Returns
-    -------
-    joints : range
-    outer : int
-        Index of the body further out along the chain.
+    Parameters
+    ----------
+    robot : RobotModel
+    bodies : BodyGeometry
+
+    Attributes
+    ----------
+    bounds : array, shape (bodies, dof)
+        No point of a body moves further than ``bounds @ |Δq|`` in the root frame; see
+        :func:`reachmap.core.collision.displacement.displacement_bounds`.
     """
-    first = geometry.geometryObjects[pair.first].parentJoint
-    second = geometry.geometryObjects[pair.second].parentJoint
-    outer = pair.first if first > second else pair.second
-    return range(min(first, second), max(first, second)), int(outer)
+
+    def __init__(self, robot: RobotModel, bodies: BodyGeometry) -> None:
+        # One row for each joint of the body model: the arm's own, then followers.
+        self._shares = np.abs(np.vstack([np.eye(robot.dof), robot.following]))
+        model = robot.body_model
+        self._each = displacement_bounds(model, bodies)
+        self.bounds = self._each @ self._shares
+        self._supports = [
+            {joint - 1 for joint in model.supports[body.parentJoint] if joint}
+            for body in bodies.geometry.geometryObjects
+        ]
+
+    def between(self, pair: Any) -> tuple[IntArray, FloatArray]:
+        """Joints of the arm that move one body of a pair against the other.
+
+        Returns
+        -------
+        joints : int array
+            0-based.
+        reach : array, shape (dof,)
+            Bound of the relative displacement [m/rad or m/m].
+        """
+        first, second = self._supports[pair.first], self._supports[pair.second]
+        each = np.zeros(len(self._shares))
+        for body, joints in (
+            (pair.first, first - second),
+            (pair.second, second - first),
+        ):
+            each[list(joints)] = self._each[body, list(joints)]
+        moving = self._shares[sorted(first ^ second)].any(axis=0)
+        return np.flatnonzero(moving), each @ self._shares
 
 
 class _Prover:
     def __init__(
-        self, model: Any, geometry: Any, bounds: FloatArray, margin_m: float
+        self, robot: RobotModel, geometry: Any, motion: PairMotion, margin_m: float
     ) -> None:
-        self.model, self.geometry = model, geometry
-        self.bounds, self.margin_m = bounds, margin_m
-        self.data, self.geometry_data = model.createData(), geometry.createData()
+        self.robot, self.model, self.geometry = robot, robot.body_model, geometry
+        self.motion, self.margin_m = motion, margin_m
+        self.data, self.geometry_data = self.model.createData(), geometry.createData()
 
     def never_meets(self, index: int) -> bool:
-        joints, outer = joints_between(
-            self.geometry, self.geometry.collisionPairs[index]
-        )
+        joints, bound = self.motion.between(self.geometry.collisionPairs[index])
         if not 0 < len(joints) <= MAX_JOINTS:
             return False
-        which = list(joints)
-        reach = self.bounds[outer, which]
-        boxes = [
-            (self.model.lowerPositionLimit[which], self.model.upperPositionLimit[which])
-        ]
-        q = pin.neutral(self.model)
+        which = joints.tolist()
+        reach = bound[which]
+        boxes = [(self.robot.lower_rad[which], self.robot.upper_rad[which])]
+        q = np.zeros(self.robot.dof)
         for _ in range(MAX_BOXES):
             if not boxes:
                 return True
@@ -110,6 +143,10 @@ class _Prover:
     def _apart(self, index: int, q: FloatArray, distance_m: float) -> bool:
         self.geometry_data.collisionRequests[index].security_margin = distance_m
         pin.updateGeometryPlacements(
-            self.model, self.data, self.geometry, self.geometry_data, q
+            self.model,
+            self.data,
+            self.geometry,
+            self.geometry_data,
+            self.robot.body_configuration(q),
         )
         return not pin.computeCollision(self.geometry, self.geometry_data, index)

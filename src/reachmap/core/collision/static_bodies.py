@@ -95,8 +95,9 @@ def bodies_at(
     robot: RobotModel, bodies: BodyGeometry, q: FloatArray
 ) -> list[PlacedBody]:
     """Every body of a cell with the arm at q, in robot_base."""
-    data, placed = robot.model.createData(), bodies.geometry.createData()
-    pin.updateGeometryPlacements(robot.model, data, bodies.geometry, placed, q)
+    model, q_bodies = robot.body_model, robot.body_configuration(q)
+    data, placed = model.createData(), bodies.geometry.createData()
+    pin.updateGeometryPlacements(model, data, bodies.geometry, placed, q_bodies)
     return [
         PlacedBody(
             name=name,
@@ -108,13 +109,6 @@ def bodies_at(
             bodies.names, bodies.geometry.geometryObjects, placed.oMg, strict=True
         )
     ]
-
-
-def convex_hull(points: FloatArray) -> Any:
-    """Convex shape around points (n, 3)."""
-    vector = coal.StdVec_Vec3s()
-    vector.extend(list(np.asarray(points, float)))
-    return coal.Convex.convexHull(vector, True, "Qt")
 
 
 def box_around(shape: Any, T: FloatArray) -> tuple[FloatArray, FloatArray]:

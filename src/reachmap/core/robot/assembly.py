@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,12 +12,11 @@ import pinocchio as pin
 
 from reachmap._typing import FloatArray
 from reachmap.cell.model.cell import JointLimits, RobotSpec
-from reachmap.core.robot.limits import JointRange, LimitTable, merge_limits
-from reachmap.core.robot.urdf_joints import UrdfJoints
+from reachmap.core.robot.limits import LimitTable, merge_limits
+from reachmap.core.robot.urdf_joints import LINK_MARK, Follower, UrdfJoints
 from reachmap.errors import SceneError
 
 TCP_FRAME = "reachmap_tcp"
-JOINT_SUFFIX = " (joint)"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -59,25 +58,28 @@ def model_from_text(urdf: str) -> Any:
 
 def _root_link(model: Any) -> str:
     bodies = [f for f in model.frames if f.type == pin.FrameType.BODY]
-    return str(bodies[0].name)
+    return str(bodies[0].name).removesuffix(LINK_MARK)
 
 
 def find_frame(model: Any, name: str, where: str) -> int:
     """Index of a URDF frame; `where` names the place in the cell for the message."""
+    # Links and joints may share a name; a link is meant first.
+    if model.existFrame(name + LINK_MARK):
+        name += LINK_MARK
     if not model.existFrame(name):
-        names = [f.name for f in model.frames if f.name != "universe"]
+        names = [
+            f.name.removesuffix(LINK_MARK) for f in model.frames if f.name != "universe"
+        ]
         raise SceneError(
             f"{where}: the URDF has no frame {name!r} (frames: {', '.join(names)})"
         )
-    wanted = pin.FrameType.BODY
-    # Links and joints may share a name; a link is meant first.
-    if model.existFrame(name, wanted):
-        return int(model.getFrameId(name, wanted))
     return int(model.getFrameId(name))
 
 
-def moving_joints(model: Any, spec: RobotSpec, chain: Sequence[str]) -> list[str]:
-    """Joints that move, in chain order."""
+def moving_joints(
+    model: Any, spec: RobotSpec, urdf: UrdfJoints, chain: Sequence[str]
+) -> list[str]:
+    """Joints that move by themselves, in chain order."""
     wanted = chain if spec.joints is None else spec.joints
     locked = spec.locked_joints_deg
     problems = [
@@ -97,7 +99,18 @@ def moving_joints(model: Any, spec: RobotSpec, chain: Sequence[str]) -> list[str
         for name in locked
         if name not in names
     ]
-    moving = [name for name in chain if name in wanted and name not in locked]
+    moving = [
+        name
+        for name in chain
+        if name in wanted and name not in locked and name not in urdf.followers
+    ]
+    problems += [
+        f"robot.urdf: joint {name!r} is between base and TCP and follows "
+        f"{leader.leader!r}; arms with coupled joints are not supported (one of the "
+        "two can be locked in robot.locked_joints_deg)"
+        for name, leader in urdf.followers.items()
+        if name in chain and leader.leader in moving and name not in locked
+    ]
     if not moving:
         problems.append("robot.joints: no joint is left that moves")
     if problems:
@@ -105,31 +118,21 @@ def moving_joints(model: Any, spec: RobotSpec, chain: Sequence[str]) -> list[str
     return moving
 
 
-def locked_positions(
-    model: Any, spec: RobotSpec, urdf: UrdfJoints, moving: Sequence[str]
-) -> FloatArray:
-    """Give the positions of the full model, (nq,); moving joints at zero [rad or m]."""
-    following = [
-        name
-        for name, mimic in urdf.mimics.items()
-        if name in moving or mimic.joint in moving
-    ]
-    if following:
-        raise SceneError(
-            f"robot.urdf: {', '.join(following)}: a joint that mimics one of the "
-            "joints between base and TCP is not supported; lock one of the two in "
-            "robot.locked_joints_deg"
-        )
+def locked_positions(model: Any, spec: RobotSpec, urdf: UrdfJoints) -> FloatArray:
+    """Give the positions of the full model, (nq,); moving joints at zero [rad or m].
+
+    Followers of locked joints stand where their leaders put them, unless they are
+    locked themselves.
+    """
     # Zero, or the nearest position allowed: some joints (Panda's elbow) exclude it.
     q = np.clip(0.0, model.lowerPositionLimit, model.upperPositionLimit)
     for name, value in spec.locked_joints_deg.items():
-        turns = urdf.types[name] != "prismatic"
+        turns = urdf.joints[name].type != "prismatic"
         q[_index(model, name)] = math.radians(value) if turns else value
-    for name, mimic in urdf.mimics.items():
-        if name in spec.locked_joints_deg or not model.existJointName(mimic.joint):
-            continue
-        leader = q[_index(model, mimic.joint)]
-        q[_index(model, name)] = mimic.multiplier * leader + mimic.offset
+    for name, follower in urdf.followers.items():
+        if name not in spec.locked_joints_deg:
+            leader = q[_index(model, follower.leader)]
+            q[_index(model, name)] = follower.multiplier * leader + follower.offset
     return np.asarray(q, float)
 
 
@@ -145,26 +148,8 @@ def reduced_model(
     cell: JointLimits,
 ) -> tuple[Any, LimitTable]:
     """Lock the joints that do not move, and merge the limits of the others."""
-    ranges = [
-        JointRange(
-            name=name,
-            kind=urdf.types[name],
-            lower=float(full.lowerPositionLimit[_index(full, name)]),
-            upper=float(full.upperPositionLimit[_index(full, name)]),
-            velocity=float(full.velocityLimit[_index(full, name)]),
-        )
-        for name in moving
-    ]
-    limits = merge_limits(ranges, cell)
-    locked = [full.getJointId(n) for n in list(full.names)[1:] if n not in moving]
-    try:
-        model = pin.buildReducedModel(_told_apart(full), locked, q_locked)
-    except ValueError as error:
-        raise SceneError(f"robot.urdf: joints cannot be locked ({error})") from error
-    for joint, name in enumerate(model.names):
-        model.names[joint] = name.removesuffix(JOINT_SUFFIX)
-    for frame in model.frames:
-        frame.name = frame.name.removesuffix(JOINT_SUFFIX)
+    limits = merge_limits([urdf.joints[name] for name in moving], cell)
+    model = _reduced(full, moving, q_locked)
     if list(model.names)[1:] != list(moving):
         raise SceneError("robot.urdf: the joints from base to TCP are not one chain")
     model.lowerPositionLimit = limits.lower
@@ -172,20 +157,68 @@ def reduced_model(
     return model, limits
 
 
-def _told_apart(full: Any) -> Any:
-    """Copy in which no joint shares its name with a link, which a URDF allows.
+def _reduced(full: Any, kept: Sequence[str], q_locked: FloatArray) -> Any:
+    locked = [full.getJointId(n) for n in list(full.names)[1:] if n not in kept]
+    try:
+        return pin.buildReducedModel(full, locked, q_locked)
+    except ValueError as error:
+        raise SceneError(f"robot.urdf: joints cannot be locked ({error})") from error
 
-    Pinocchio looks up the frames of joints by name alone when it locks any.
+
+def with_followers(
+    full: Any,
+    chain: Any,
+    q_locked: FloatArray,
+    followers: Mapping[str, Follower],
+) -> Any:
+    """Model of the chain's joints, in order, and then of those that follow them.
+
+    Parameters
+    ----------
+    full, chain : pinocchio.Model
+    q_locked : array, shape (nq of full,)
+    followers : mapping
+        Joints that follow one of the chain.
+
+    Returns
+    -------
+    pinocchio.Model
+        The chain itself where nothing follows. Pinocchio has joints that mimic, but
+        only such that come after their leaders in the tree.
     """
-    model = full.copy()
-    links = {f.name for f in full.frames if f.type == pin.FrameType.BODY}
-    for frame in model.frames:
-        if frame.name in links and frame.type != pin.FrameType.BODY:
-            frame.name += JOINT_SUFFIX
-    for joint, name in enumerate(full.names):
-        if name in links:
-            model.names[joint] = name + JOINT_SUFFIX
+    if not followers:
+        return chain
+    moving = list(chain.names)[1:]
+    tree = _reduced(full, [*moving, *followers], q_locked)
+    order = [*moving, *(n for n in list(tree.names)[1:] if n in followers)]
+    model, index = pin.Model(), {0: 0}
+    for name in order:
+        joint = tree.getJointId(name)
+        index[joint] = model.addJoint(
+            index[tree.parents[joint]],
+            tree.joints[joint],
+            tree.jointPlacements[joint],
+            name,
+        )
+    for frame in list(tree.frames)[1:]:
+        joint = index[frame.parentJoint]
+        model.addFrame(pin.Frame(frame.name, joint, 0, frame.placement, frame.type))
+    ends = np.array([chain.lowerPositionLimit, chain.upperPositionLimit])
+    matrix, offset = following(moving, [(n, followers[n]) for n in order[chain.nq :]])
+    both = ends @ matrix.T + offset
+    model.lowerPositionLimit = np.append(ends[0], both.min(axis=0))
+    model.upperPositionLimit = np.append(ends[1], both.max(axis=0))
     return model
+
+
+def following(
+    moving: Sequence[str], followers: Sequence[tuple[str, Follower]]
+) -> tuple[FloatArray, FloatArray]:
+    """Matrix (followers, dof) and offset (followers,) from moving joints to others."""
+    matrix = np.zeros((len(followers), len(moving)))
+    for row, (_, follower) in zip(matrix, followers, strict=True):
+        row[list(moving).index(follower.leader)] = follower.multiplier
+    return matrix, np.array([follower.offset for _, follower in followers], float)
 
 
 def add_tcp(model: Any, spec: RobotSpec) -> Any:

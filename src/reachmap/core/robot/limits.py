@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from reachmap._typing import FloatArray
+from reachmap.cell.files.urdf import UrdfJoint, full_turn
 from reachmap.cell.model.cell import JointLimits
-from reachmap.core.robot.urdf_joints import UNBOUNDED
 from reachmap.errors import SceneError
 
 
@@ -26,9 +26,9 @@ class LimitTable:
     lower, upper : array, shape (dof,)
         Positions [rad].
     velocity : array, shape (dof,)
-        Speeds [rad/s], the cell's scaling applied.
+        Speeds [rad/s], times the cell's scaling.
     acceleration : array, shape (dof,)
-        Accelerations [rad/s²], the cell's scaling applied.
+        Accelerations [rad/s²], times the square of the cell's scaling.
     """
 
     lower: FloatArray
@@ -37,24 +37,13 @@ class LimitTable:
     acceleration: FloatArray
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class JointRange:
-    """What the URDF says about one joint; 0 as velocity means "not given"."""
-
-    name: str
-    kind: str
-    lower: float
-    upper: float
-    velocity: float
-
-
-def merge_limits(joints: Sequence[JointRange], cell: JointLimits) -> LimitTable:
+def merge_limits(joints: Sequence[UrdfJoint], cell: JointLimits) -> LimitTable:
     """Intersect the limits of URDF and cell.
 
     Parameters
     ----------
-    joints : sequence of JointRange
-        Limits of the URDF, in chain order.
+    joints : sequence of UrdfJoint
+        In chain order.
     cell : JointLimits
         Limits of the cell; ``position_deg`` is in metres for prismatic joints.
 
@@ -74,11 +63,13 @@ def merge_limits(joints: Sequence[JointRange], cell: JointLimits) -> LimitTable:
         lower=lower.copy(),
         upper=upper.copy(),
         velocity=velocity * cell.scaling,
-        acceleration=acceleration * cell.scaling,
+        # A motion takes 1/scaling times as long, whichever of the two limits it,
+        # if accelerations go with the square; so do the speed sliders of controllers.
+        acceleration=acceleration * cell.scaling**2,
     )
 
 
-def _unknown_names(joints: Sequence[JointRange], cell: JointLimits) -> list[str]:
+def _unknown_names(joints: Sequence[UrdfJoint], cell: JointLimits) -> list[str]:
     names = [j.name for j in joints]
     problems = []
     for field in ("position_deg", "velocity_rad_s", "acceleration_rad_s2"):
@@ -93,26 +84,28 @@ def _unknown_names(joints: Sequence[JointRange], cell: JointLimits) -> list[str]
 
 
 def _position(
-    joint: JointRange, cell: JointLimits, problems: list[str]
+    joint: UrdfJoint, cell: JointLimits, problems: list[str]
 ) -> tuple[float, float]:
-    turns = joint.kind != "prismatic"
-    bounds = []
-    if joint.kind != "continuous":
+    turns = joint.type != "prismatic"
+    bounds: list[tuple[float | None, float | None]] = []
+    if joint.type != "continuous":
         bounds.append((joint.lower, joint.upper))
     if joint.name in cell.position_deg:
-        low, high = cell.position_deg[joint.name]
         factor = math.pi / 180 if turns else 1.0
-        bounds.append((low * factor, high * factor))
-    if not bounds:  # a continuous joint that nobody bounds
-        bounds.append((joint.lower, joint.upper))
-    low, high = max(b[0] for b in bounds), min(b[1] for b in bounds)
-    unit = "rad" if turns else "m"
-    if max(abs(low), abs(high)) >= UNBOUNDED:
+        low_given, high_given = cell.position_deg[joint.name]
+        bounds.append((factor * low_given, factor * high_given))
+    low = max((b[0] for b in bounds if b[0] is not None), default=None)
+    high = min((b[1] for b in bounds if b[1] is not None), default=None)
+    if turns and low is None and high is None:
+        low, high = full_turn(low, high)
+    if low is None or high is None:
         problems.append(
             f"robot.limits.position_deg: joint {joint.name!r} has no limit in the URDF "
-            f"(lower {low:.6g}, upper {high:.6g} {unit}); give it [low, high] here"
+            "on one side at least; give it [low, high] here"
         )
-    elif not (math.isfinite(low) and math.isfinite(high) and low < high):
+        return math.nan, math.nan
+    if not (math.isfinite(low) and math.isfinite(high) and low < high):
+        unit = "rad" if turns else "m"
         problems.append(
             f"robot.limits: joint {joint.name!r} has no range left "
             f"(lower {low:.6g}, upper {high:.6g} {unit})"
@@ -121,14 +114,14 @@ def _position(
 
 
 def _rates(
-    joints: Sequence[JointRange],
+    joints: Sequence[UrdfJoint],
     given: float | Mapping[str, float] | None,
     what: str,
     problems: list[str],
 ) -> FloatArray:
     values, missing = [], []
     for joint in joints:
-        candidates = [joint.velocity] if what == "velocity" else []
+        candidates = [joint.velocity or 0.0] if what == "velocity" else []
         if isinstance(given, Mapping):
             candidates.append(given.get(joint.name, 0.0))
         elif given is not None:

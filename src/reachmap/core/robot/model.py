@@ -7,7 +7,7 @@ are in *base*.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -19,10 +19,12 @@ from reachmap.core.robot.assembly import (
     BaseToTip,
     add_tcp,
     find_frame,
+    following,
     locked_positions,
     model_from_text,
     moving_joints,
     reduced_model,
+    with_followers,
 )
 from reachmap.core.robot.urdf_joints import read_urdf_joints
 from reachmap.errors import SceneError
@@ -41,11 +43,12 @@ class RobotModel:
     model : pinocchio.Model
         Joints that do not move are locked and gone; ``nq == nv == dof``, and the
         TCP is its frame ``reachmap_tcp``.
-    urdf : str
-        URDF text; link geometry is built from it and `model` with
-        ``pin.buildGeomFromUrdfString``.
-    package_dirs : tuple of str
-        Folders in which ``package://`` names are looked up.
+    body_model : pinocchio.Model
+        What carries bodies: the joints of `model`, then those beside the chain that
+        follow one of them (gas springs, parallelograms, fingers).
+    following : array, shape (followers, dof)
+    following_offset : array, shape (followers,)
+        Positions of the followers are ``following @ q + following_offset``.
     joint_names : tuple of str
         In the order of a configuration.
     is_revolute : array of bool, shape (dof,)
@@ -70,8 +73,9 @@ class RobotModel:
     """
 
     model: Any = field(repr=False)
-    urdf: str = field(repr=False)
-    package_dirs: tuple[str, ...]
+    body_model: Any = field(repr=False)
+    following: FloatArray
+    following_offset: FloatArray
     joint_names: tuple[str, ...]
     is_revolute: BoolArray
     lower_rad: FloatArray
@@ -106,20 +110,10 @@ class RobotModel:
             A frame or joint is unknown, a limit is missing, or the chain from base
             to TCP cannot be used; one line per mistake.
         """
-        return cls.from_spec(
-            loaded.cell.robot,
-            urdf=loaded.urdf_for_engine,
-            package_dirs=loaded.package_dirs,
-        )
+        return cls.from_spec(loaded.cell.robot, urdf=loaded.urdf)
 
     @classmethod
-    def from_spec(
-        cls,
-        spec: RobotSpec,
-        *,
-        urdf: str,
-        package_dirs: Sequence[str] = (),
-    ) -> RobotModel:
+    def from_spec(cls, spec: RobotSpec, *, urdf: str) -> RobotModel:
         """Build an arm from its description and its URDF.
 
         Parameters
@@ -128,8 +122,6 @@ class RobotModel:
             With ``group`` and ``joint_limits`` written out, as in a loaded cell.
         urdf : str
             Text, xacro already expanded.
-        package_dirs : sequence of str
-            Folders in which ``package://`` names are looked up.
 
         Raises
         ------
@@ -139,19 +131,30 @@ class RobotModel:
         description = read_urdf_joints(urdf)
         full = model_from_text(description.text)
         chain = BaseToTip.between(full, spec.base_frame, spec.tcp.parent)
-        moving = moving_joints(full, spec, chain.joints)
-        q_locked = locked_positions(full, spec, description, moving)
+        moving = moving_joints(full, spec, description, chain.joints)
+        q_locked = locked_positions(full, spec, description)
         model, limits = reduced_model(full, moving, q_locked, description, spec.limits)
+        followers = {
+            name: follower
+            for name, follower in description.followers.items()
+            if follower.leader in moving and name not in spec.locked_joints_deg
+        }
+        body_model = with_followers(full, model, q_locked, followers)
+        names = list(body_model.names)[len(moving) + 1 :]
+        matrix, offset = following(moving, [(n, followers[n]) for n in names])
         tcp = add_tcp(model, spec)
         root_base = model.frames[
             find_frame(model, chain.base, "robot.base_frame")
         ].placement
         return cls(
             model=model,
-            urdf=description.text,
-            package_dirs=tuple(package_dirs),
+            body_model=body_model,
+            following=matrix,
+            following_offset=offset,
             joint_names=tuple(moving),
-            is_revolute=np.array([description.types[n] != "prismatic" for n in moving]),
+            is_revolute=np.array(
+                [description.joints[n].type != "prismatic" for n in moving]
+            ),
             lower_rad=limits.lower,
             upper_rad=limits.upper,
             velocity_rad_s=limits.velocity,
@@ -181,7 +184,7 @@ class RobotModel:
         Returns
         -------
         joint : int
-            Index in `model` of the joint that carries the frame, 0 for the root.
+            Index in `body_model` of the joint that carries the frame, 0 for the root.
         T_joint_frame : array, shape (4, 4)
 
         Raises
@@ -193,8 +196,18 @@ class RobotModel:
             return 0, self.T_root_world
         if name == "robot_base":
             return 0, np.array(self.T_root_base)
-        frame = self.model.frames[find_frame(self.model, name, "frame")]
+        return self.link_placement(name)
+
+    def link_placement(self, name: str) -> tuple[int, FloatArray]:
+        """Where a frame of the URDF is fixed, whatever it is called."""
+        frame = self.body_model.frames[find_frame(self.body_model, name, "frame")]
         return int(frame.parentJoint), np.array(frame.placement.homogeneous)
+
+    def body_configuration(self, q: FloatArray) -> FloatArray:
+        """Positions of the joints of `body_model`, (dof,) to (dof + followers,)."""
+        if not len(self.following):
+            return q
+        return np.concatenate([q, self.following @ q + self.following_offset])
 
     def configuration(self, values: Mapping[str, float], where: str) -> FloatArray:
         """Joint vector from values by joint name, shape (dof,).

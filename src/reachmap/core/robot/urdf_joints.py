@@ -1,30 +1,37 @@
-"""What the URDF text says that a Pinocchio model no longer tells.
+"""The joints of a URDF as Pinocchio is given them, and those that follow others.
 
-Joint types and mimic joints are read from the XML, and continuous joints are given
-bounds, so that every joint is one number (Pinocchio would use a cosine and a sine,
-and a configuration would no longer be a vector of angles).
+The text for the engine has no geometry (which is read elsewhere), a bound at each
+end of each joint, so that every joint is one number (of a continuous joint Pinocchio
+would make a cosine and a sine), and names of links that no joint shares.
 """
 
 from __future__ import annotations
 
-import math
 import xml.etree.ElementTree as ET
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
-from reachmap.cell.files.urdf import MOVING
+from reachmap.cell.files.urdf import (
+    MOVING,
+    UrdfDescription,
+    UrdfJoint,
+    full_turn,
+    parse_urdf,
+)
 from reachmap.cell.files.xml_text import parse_xml
 from reachmap.errors import SceneError
 
-# Stands in the engine's URDF for a bound that the robot's URDF does not give.
-UNBOUNDED = 1e300
+# Joints and links are name spaces of their own in a URDF, and one in Pinocchio.
+LINK_MARK = " (link)"
+# Stands for the end that a sliding joint lacks [m]; the cell has to give it.
+_FAR_M = 1e6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Mimic:
-    """A joint that follows another: ``multiplier * position(joint) + offset``."""
+class Follower:
+    """A joint that stands at ``multiplier * position(leader) + offset``."""
 
-    joint: str
+    leader: str
     multiplier: float
     offset: float
 
@@ -36,16 +43,18 @@ class UrdfJoints:
     Attributes
     ----------
     text : str
-        The URDF with continuous joints turned into revolute ones, ±π.
-    types : mapping
-        Original type: ``revolute``, ``continuous`` or ``prismatic``.
-    mimics : mapping
-        Joints that follow another joint.
+        What Pinocchio is given.
+    description : UrdfDescription
+    joints : mapping
+        Those that are not fixed.
+    followers : mapping
+        Joints that mimic another, with the leader that mimics nobody.
     """
 
     text: str
-    types: Mapping[str, str]
-    mimics: Mapping[str, Mimic]
+    description: UrdfDescription
+    joints: Mapping[str, UrdfJoint]
+    followers: Mapping[str, Follower]
 
 
 def read_urdf_joints(urdf: str) -> UrdfJoints:
@@ -59,86 +68,81 @@ def read_urdf_joints(urdf: str) -> UrdfJoints:
     Raises
     ------
     CellError
-        The text is not XML.
+        The text is no URDF.
     SceneError
-        It is no URDF, or a joint has more than one degree of freedom.
+        A joint has more than one degree of freedom, or joints mimic in a circle.
     """
-    root = parse_xml(urdf, "robot.urdf")
-    if root.tag != "robot":
-        raise SceneError(f"robot.urdf: expected a <robot> element, got <{root.tag}>")
-    types: dict[str, str] = {}
-    changed = False
-    mimics: dict[str, Mimic] = {}
-    problems: list[str] = []
-    for joint in root.findall("joint"):
-        name, kind = joint.get("name", ""), joint.get("type", "")
-        if kind == "fixed":
-            continue
-        if kind not in MOVING:
-            problems.append(
-                f"robot.urdf: joint {name!r} has type {kind!r}; "
-                f"only fixed, {', '.join(MOVING)} joints are supported"
-            )
-        mimics.update(_mimic_of(joint, name))
-        changed |= _drop_infinite(joint)
-        types[name] = joint.get("type", "")
-        changed |= _bound_if_continuous(joint)
+    description = parse_urdf(urdf, "robot.urdf")
+    joints = {n: j for n, j in description.joints.items() if j.type != "fixed"}
+    problems = [
+        f"robot.urdf: joint {joint.name!r} has type {joint.type!r}; "
+        f"only fixed, {', '.join(MOVING)} joints are supported"
+        for joint in joints.values()
+        if joint.type not in MOVING
+    ]
+    followers = {}
+    for name, joint in joints.items():
+        if joint.mimics is not None:
+            try:
+                followers[name] = _follower(name, joints)
+            except ValueError as error:
+                problems.append(f"robot.urdf: joint {name!r}: {error}")
     if problems:
         raise SceneError(problems)
-    text = ET.tostring(root, encoding="unicode") if changed else urdf
-    return UrdfJoints(text=text, types=types, mimics=mimics)
+    text = _engine_text(urdf, description)
+    return UrdfJoints(
+        text=text, description=description, joints=joints, followers=followers
+    )
 
 
-def _mimic_of(joint: ET.Element, name: str) -> Iterator[tuple[str, Mimic]]:
-    mimic = joint.find("mimic")
-    if mimic is not None:
-        yield (
-            name,
-            Mimic(
-                joint=mimic.get("joint", ""),
-                multiplier=float(mimic.get("multiplier", 1.0)),
-                offset=float(mimic.get("offset", 0.0)),
-            ),
+def _follower(name: str, joints: Mapping[str, UrdfJoint]) -> Follower:
+    """Follow a chain of mimicking joints to the one that leads."""
+    multiplier, offset, seen = 1.0, 0.0, [name]
+    while (joint := joints[seen[-1]]).mimics is not None:
+        if joint.mimics not in joints:
+            raise ValueError(f"mimics {joint.mimics!r}, which is no moving joint")
+        if joint.mimics in seen:
+            raise ValueError(f"mimics in a circle ({' → '.join(seen)} → …)")
+        offset += multiplier * joint.offset
+        multiplier *= joint.multiplier
+        seen.append(joint.mimics)
+    return Follower(leader=seen[-1], multiplier=multiplier, offset=offset)
+
+
+def _engine_text(urdf: str, description: UrdfDescription) -> str:
+    root = parse_xml(urdf, "robot.urdf")
+    shared = set(description.links) & set(description.joints)
+    for link in root.findall("link"):
+        for part in [*link.findall("visual"), *link.findall("collision")]:
+            link.remove(part)
+        if link.get("name") in shared:
+            link.set("name", link.get("name", "") + LINK_MARK)
+    for joint in root.findall("joint"):
+        for tag in ("mimic", "safety_controller", "dynamics"):
+            for part in joint.findall(tag):
+                joint.remove(part)
+        for tag in ("parent", "child"):
+            end = joint.find(tag)
+            if end is not None and end.get("link") in shared:
+                end.set("link", end.get("link", "") + LINK_MARK)
+        if joint.get("type") in MOVING:
+            _bound(joint, description.joints[joint.get("name", "")])
+    return ET.tostring(root, encoding="unicode")
+
+
+def _bound(element: ET.Element, joint: UrdfJoint) -> None:
+    """Give both ends; the limits that count are merged from the description."""
+    low, high = joint.lower, joint.upper
+    if joint.type == "prismatic":
+        low, high = (
+            (-_FAR_M if low is None else low),
+            (_FAR_M if high is None else high),
         )
-
-
-def _drop_infinite(joint: ET.Element) -> bool:
-    """Rewrite infinite numbers, which urdfdom refuses, as numbers not given.
-
-    A revolute joint without either bound becomes a continuous one; another bound that
-    is missing becomes ±UNBOUNDED. True if anything was rewritten.
-    """
-    rewritten = False
-    for part in (e for e in joint if e.tag in ("limit", "dynamics")):
-        for key in [k for k, text in part.items() if _is_infinite(text)]:
-            rewritten = True
-            sign = -1.0 if key == "lower" else 1.0
-            part.set(key, repr(sign * UNBOUNDED) if key in ("lower", "upper") else "0")
-    for part in joint.findall("safety_controller"):
-        if any(_is_infinite(text) for text in part.attrib.values()):
-            joint.remove(part)
-            rewritten = True
-    bounds = [(e.get("lower"), e.get("upper")) for e in joint.findall("limit")]
-    if rewritten and bounds == [(repr(-UNBOUNDED), repr(UNBOUNDED))]:
-        joint.set("type", joint.get("type", "").replace("revolute", "continuous"))
-    return rewritten
-
-
-def _is_infinite(text: str) -> bool:
-    try:
-        return math.isinf(float(text))
-    except ValueError:
-        return False
-
-
-def _bound_if_continuous(joint: ET.Element) -> bool:
-    if joint.get("type") != "continuous":
-        return False
-    joint.set("type", "revolute")
-    limit = joint.find("limit")
-    if limit is None:
-        # A revolute joint must state both; 0 stands for "not given".
-        limit = ET.SubElement(joint, "limit", effort="0", velocity="0")
-    limit.set("lower", repr(-math.pi))
-    limit.set("upper", repr(math.pi))
-    return True
+    else:
+        element.set("type", "revolute")
+        low, high = full_turn(low, high)
+    for limit in element.findall("limit"):
+        element.remove(limit)
+    ET.SubElement(
+        element, "limit", effort="0", velocity="0", lower=repr(low), upper=repr(high)
+    )

@@ -11,8 +11,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from reachmap.cell.files.meshes import MeshError, mesh_size
 from reachmap.cell.files.resources import data_folder
+from reachmap.cell.meshes.reading import MeshError, read_mesh
+from reachmap.cell.model.shapes import sides
 
 TRIANGLE = np.array([[0.0, 0, 0], [1, 0, 2], [0, 3, 0]])
 
@@ -51,6 +52,8 @@ DAE = b"""<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema">
 <source id="p"><float_array>0 0 0 1000 0 2000 0 3000 0</float_array></source>
 <source id="n"><float_array>9 9 9 9e9 9 9</float_array></source>
 <vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
+<triangles count="1"><input semantic="VERTEX" source="#v" offset="0"/>
+<input semantic="NORMAL" source="#n" offset="1"/><p>0 0 1 1 2 0</p></triangles>
 </mesh></geometry></library_geometries></COLLADA>"""
 FILES = {
     "binary.stl": binary_stl(),
@@ -68,7 +71,7 @@ FILES = {
 @pytest.mark.parametrize("name", FILES)
 def test_sizes_of_all_formats(name: str) -> None:
     """The same triangle in each format has the same box."""
-    size = mesh_size(FILES[name], Path(name).suffix)
+    size = sides(read_mesh(FILES[name], Path(name).suffix))
     assert np.allclose(size, [1.0, 3.0, 2.0])
 
 
@@ -82,7 +85,7 @@ def test_sizes_agree_with_coal(link: str) -> None:
     mesh = coal.MeshLoader().load(str(path), np.ones(3))
     mesh.computeLocalAABB()
     box = mesh.aabb_local.max_ - mesh.aabb_local.min_
-    assert np.allclose(mesh_size(path.read_bytes(), ".stl"), box, atol=1e-6)
+    assert np.allclose(sides(read_mesh(path.read_bytes(), ".stl")), box, atol=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -90,25 +93,25 @@ def test_sizes_agree_with_coal(link: str) -> None:
     [
         ("a.stl", b"", "cut short"),
         ("a.stl", b"x" + binary_stl()[1:-1], "cut short"),
-        ("a.stl", binary_stl()[:-1], "no vertices"),
-        ("a.stl", b"solid x\nendsolid x\n", "no vertices"),
-        ("a.stl", b"solid x\nvertex 1 2 nan\n", "not finite"),
+        ("a.stl", binary_stl()[:-1], "cut short"),
+        ("a.stl", b"solid x\nendsolid x\n", "no triangles"),
+        ("a.stl", b"solid x\n" + b"vertex 1 2 nan\n" * 3, "not finite"),
         ("a.stl", b"solid x\nvertex 1 2 x\n", "could not convert"),
-        ("a.obj", b"o nothing\n", "no vertices"),
+        ("a.obj", b"o nothing\n", "no triangles"),
         ("a.ply", b"ply\n", "not a PLY file"),
         ("a.ply", ply("binary_big_endian")[:-40], "cut short"),
         ("a.ply", ply("ascii").replace(b"vertex 3", b"vertex x"), "invalid literal"),
         ("a.ply", ply("ascii").replace(b"double x", b"list x"), "unknown property"),
         ("a.dae", b"<COLLADA>", "not valid XML"),
         ("a.dae", b"<!DOCTYPE a><COLLADA/>", "document type"),
-        ("a.dae", b"<COLLADA/>", "no vertices"),
-        ("a.glb", b"glTF", "unknown mesh format"),
+        ("a.dae", b"<COLLADA/>", "no triangles"),
+        ("a.glb", b"glTF", "glTF meshes are not read"),
     ],
 )
 def test_damaged_meshes_are_refused(name: str, data: bytes, message: str) -> None:
     """Each with a sentence."""
     with pytest.raises(MeshError, match=message):
-        mesh_size(data, Path(name).suffix)
+        read_mesh(data, Path(name).suffix)
 
 
 @settings(max_examples=150, deadline=None)
@@ -125,7 +128,8 @@ def test_mutated_meshes_end_in_a_size_or_a_mesh_error(
     for position, value in flips:
         data[position % len(data)] = value
     try:
-        size = mesh_size(bytes(data[: len(data) - cut % len(data)]), Path(name).suffix)
+        kept = bytes(data[: len(data) - cut % len(data)])
+        size = sides(read_mesh(kept, Path(name).suffix))
     except MeshError:
         return
     assert np.isfinite(size).all()

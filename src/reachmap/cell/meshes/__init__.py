@@ -1,0 +1,1 @@
+"""Mesh files: STL, OBJ, PLY and COLLADA, each to the same triangles."""

@@ -1,0 +1,132 @@
+"""Triangles of mesh files: STL, OBJ, PLY and COLLADA.
+
+Counts, indices and numbers are checked here, so that no engine meets a damaged file:
+what is measured against the limits of size, checked for collision and drawn is one
+and the same set of triangles.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from reachmap._typing import FloatArray, IntArray
+from reachmap.cell.meshes.collada import collada_triangles
+from reachmap.cell.meshes.ply import ply_triangles
+from reachmap.cell.meshes.polygons import MeshError, fans
+from reachmap.cell.model.shapes import TriangleMesh
+
+__all__ = ["MeshError", "read_mesh"]
+
+_STL_VERTEX = re.compile(rb"\bvertex\s+(\S+)\s+(\S+)\s+(\S+)")
+_OTHERS = {
+    ".glb": "glTF", ".gltf": "glTF", ".step": "STEP", ".stp": "STEP",
+    ".iges": "IGES", ".igs": "IGES", ".3ds": "3DS", ".fbx": "FBX", ".usd": "USD",
+}  # fmt: skip
+
+
+def read_mesh(data: bytes, suffix: str) -> TriangleMesh:
+    """Read the triangles of a mesh file.
+
+    Parameters
+    ----------
+    data : bytes
+        The whole file.
+    suffix : str
+        ``.stl``, ``.obj``, ``.dae`` or ``.ply``; case does not matter.
+
+    Returns
+    -------
+    TriangleMesh
+        In the file's own unit; COLLADA states its unit, and is in metres.
+
+    Raises
+    ------
+    MeshError
+        The file has no triangles, is cut short, names vertices that it does not have,
+        or holds numbers that are not finite.
+    """
+    readers: dict[str, Callable[[bytes], tuple[FloatArray, IntArray]]] = {
+        ".stl": _stl_triangles,
+        ".obj": _obj_triangles,
+        ".dae": collada_triangles,
+        ".ply": ply_triangles,
+    }
+    reader = readers.get(suffix.lower())
+    if reader is None:
+        kind = _OTHERS.get(suffix.lower())
+        known = f"{kind} meshes are not read" if kind else f"unknown format {suffix!r}"
+        wanted = ", ".join(readers)
+        raise MeshError(f"{known}; export it as one of {wanted}")
+    try:
+        vertices, triangles = reader(data)
+    except MeshError:
+        raise
+    except (ValueError, IndexError, OverflowError, KeyError, MemoryError) as error:
+        raise MeshError(f"damaged {suffix.lower()} file: {error}") from None
+    return _checked(vertices, triangles)
+
+
+def _checked(vertices: FloatArray, triangles: IntArray) -> TriangleMesh:
+    """Mesh of the vertices in use, each once."""
+    if not len(triangles):
+        raise MeshError("the mesh has no triangles")
+    if triangles.min() < 0 or triangles.max() >= len(vertices):
+        raise MeshError(
+            f"a triangle names a vertex that is missing (there are {len(vertices)})"
+        )
+    used, triangles = np.unique(triangles, return_inverse=True)
+    corners = vertices[used]
+    if not np.isfinite(corners).all():
+        raise MeshError("the mesh has vertices that are not finite")
+    # Adding 0.0 makes one of 0.0 and -0.0.
+    corners, same = np.unique(corners + 0.0, axis=0, return_inverse=True)
+    if len(corners) < 3:
+        raise MeshError("the mesh has no size: its vertices coincide")
+    triangles = same.reshape(-1)[triangles].reshape(-1, 3)
+    return TriangleMesh(vertices=corners, triangles=triangles.astype(np.int64))
+
+
+def _stl_triangles(data: bytes) -> tuple[FloatArray, IntArray]:
+    count = int.from_bytes(data[80:84], "little") if len(data) >= 84 else 0
+    # Some binary files begin with "solid" as text files do, and some have bytes after
+    # the last facet; as text, the four bytes of the count make a number past any file.
+    if 0 < 84 + 50 * count <= len(data) and count:
+        facet = np.dtype([("n", "<f4", 3), ("v", "<f4", (3, 3)), ("a", "<u2")])
+        facets = np.frombuffer(data, facet, count=count, offset=84)
+        corners = np.asarray(facets["v"].reshape(-1, 3), float)
+    elif data.lstrip()[:5].lower() == b"solid":
+        corners = _numbers(_STL_VERTEX.findall(data))
+        if not len(corners) and b"endsolid" not in data.lower():
+            raise MeshError("the STL file is cut short")
+        if len(corners) % 3:
+            raise MeshError("the STL file is cut short: a facet lacks a vertex")
+    elif len(data) >= 84 and not count:
+        raise MeshError("the mesh has no triangles")
+    else:
+        raise MeshError("the STL file is cut short")
+    return corners, np.arange(len(corners)).reshape(-1, 3)
+
+
+def _obj_triangles(data: bytes) -> tuple[FloatArray, IntArray]:
+    vertices: list[Sequence[bytes]] = []
+    polygons: list[list[int]] = []
+    for line in data.replace(b"\\\n", b" ").split(b"\n"):
+        if line.startswith((b"v ", b"v\t")):
+            words = line.split()[1:4]
+            if len(words) != 3:
+                raise MeshError("a vertex needs three numbers")
+            vertices.append(words)
+        elif line.startswith((b"f ", b"f\t")):
+            corners = [int(word.split(b"/")[0]) for word in line.split()[1:]]
+            if 0 in corners:
+                raise MeshError("a face names vertex 0; they are counted from 1")
+            # Negative numbers count backwards from the last vertex so far.
+            polygons.append([k - 1 if k > 0 else len(vertices) + k for k in corners])
+    return _numbers(vertices), fans(polygons)
+
+
+def _numbers(rows: Sequence[Sequence[bytes]]) -> FloatArray:
+    return np.array([[float(word) for word in row] for row in rows]).reshape(-1, 3)

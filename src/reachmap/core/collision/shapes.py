@@ -1,0 +1,56 @@
+"""Shapes for the collision engine, which trusts the numbers that it is given."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import coal
+import numpy as np
+from scipy.spatial import ConvexHull, QhullError
+
+from reachmap._typing import FloatArray
+from reachmap.cell.model.shapes import Solid, TriangleMesh
+
+
+def coal_shape(shape: Solid) -> Any:
+    """Collision geometry of a shape; a mesh is a surface, with nothing inside."""
+    if isinstance(shape, TriangleMesh):
+        surface = coal.BVHModelOBBRSS()
+        surface.beginModel(len(shape.triangles), len(shape.vertices))
+        surface.addVertices(np.ascontiguousarray(shape.vertices, float))
+        surface.addTriangles(np.ascontiguousarray(shape.triangles, np.int64))
+        surface.endModel()
+        return surface
+    kind, value = shape.kind()
+    if kind == "box":
+        return coal.Box(*value)
+    if kind == "sphere":
+        return coal.Sphere(value.radius)
+    if kind == "cylinder":
+        return coal.Cylinder(value.radius, value.length)
+    if kind == "capsule":
+        return coal.Capsule(value.radius, value.length)
+    raise ValueError(f"{value.file}: the mesh has not been read")
+
+
+def convex_hull(points: FloatArray) -> Any:
+    """Convex body around points (n, 3); None where they lie in a plane.
+
+    The hull is scipy's: coal's own is a segmentation fault where there is none.
+    """
+    points = np.asarray(points, float)
+    # Below a millionth of the size a body has no inside that an engine could use.
+    spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+    if len(points) < 4 or spread[2] < 1e-6 * spread[0]:
+        return None
+    try:
+        hull = ConvexHull(points)
+    except QhullError:
+        return None
+    corners = np.unique(hull.simplices, return_inverse=True)
+    vertices, triangles = coal.StdVec_Vec3s(), coal.StdVec_Triangle()
+    vertices.extend(list(points[corners[0]]))
+    triangles.extend(
+        [coal.Triangle(*map(int, row)) for row in corners[1].reshape(-1, 3)]
+    )
+    return coal.Convex(vertices, triangles)
