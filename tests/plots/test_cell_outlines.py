@@ -2,23 +2,17 @@
 
 from __future__ import annotations
 
-import struct
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 from reachmap.cell.loading import read_cell
 from reachmap.cell.model.cell import BinSpec, BodySpec, Cell
-from reachmap.cell.model.fields import Shape
 from reachmap.geometry import yaw_transform
 from reachmap.plots.parts.context import context_of, patch_shape
 from reachmap.plots.parts.outlines import (
     base_outline,
     bin_outlines,
     body_outlines,
-    read_stl_points,
-    shape_points,
 )
 from tests.support.synthetic_maps import cell_json, synthetic_provenance
 
@@ -128,7 +122,7 @@ URDF = """
   <joint name="a" type="fixed"><parent link="world"/><child link="foot"/></joint>
   <joint name="b" type="fixed"><parent link="foot"/><child link="plate"/>
     <origin xyz="0 0 -0.01"/></joint>
-  <joint name="c" type="revolute"><parent link="foot"/><child link="arm"/></joint>
+  <joint name="c" type="continuous"><parent link="foot"/><child link="arm"/></joint>
 </robot>
 """
 
@@ -158,21 +152,6 @@ def test_a_base_that_cannot_be_read_is_a_circle_at_the_origin(urdf: str) -> None
     np.testing.assert_allclose(np.linalg.norm(outline.polygon, axis=1), 0.05)
 
 
-def test_stl_files_of_both_kinds_give_the_same_points(tmp_path: Path) -> None:
-    """Also a binary file whose header begins like a text."""
-    corners = np.array([[[0, 0, 0], [1, 0, 0], [0, 1, 0.5]]], "<f4")
-    binary = b"solid".ljust(80) + struct.pack("<I", 1) + bytes(12)
-    binary += corners.tobytes() + bytes(2)
-    (tmp_path / "b.stl").write_bytes(binary)
-    lines = "".join(f"vertex {x} {y} {z}\n" for x, y, z in corners[0])
-    (tmp_path / "t.stl").write_text(f"solid t\nfacet\n{lines}endfacet\nendsolid t\n")
-    for name in ("b.stl", "t.stl"):
-        np.testing.assert_array_equal(read_stl_points(tmp_path / name), corners[0])
-    (tmp_path / "n.stl").write_text("no mesh at all")
-    with pytest.raises(ValueError, match=r"n\.stl: not an STL file"):
-        read_stl_points(tmp_path / "n.stl")
-
-
 def test_an_artefact_with_a_strange_cell_still_gives_pictures() -> None:
     """The numbers are worth a picture without outlines."""
     context = context_of(synthetic_provenance(cell_resolved_json='{"new": "kind"}'))
@@ -189,8 +168,3 @@ def test_patch_is_about_the_size_of_the_bin() -> None:
     assert patch_shape(turned, x / 2, y / 2) == (5, 5)
     assert patch_shape((), x, y) == (3, 3)
     assert patch_shape(turned, x * 10, y * 10) == (1, 1)
-
-
-def test_a_mesh_shape_has_no_points() -> None:
-    """Its file need not be on the machine that draws."""
-    assert shape_points(Shape.model_validate({"mesh": {"file": "a.stl"}})) is None

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import pinocchio as pin
 import pytest
 
 from reachmap.cell.loading import read_cell
@@ -127,7 +126,9 @@ def test_fingers_that_mimic_follow_their_leader() -> None:
 def test_a_mimic_joint_in_the_arm_is_refused() -> None:
     """A joint that follows a moving joint would make the chain another one."""
     arm = [Link(), Link(extra='<mimic joint="joint_1"/>')]
-    with pytest.raises(SceneError, match=r"'joint_2' is between base and TCP and follows 'joint_1'"):
+    with pytest.raises(
+        SceneError, match=r"'joint_2' is between base and TCP and follows 'joint_1'"
+    ):
         robot(serial_urdf(arm), "link_2")
 
 
