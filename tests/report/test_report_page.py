@@ -270,7 +270,7 @@ def test_the_cell_of_a_real_run_is_drawn(toy_page: Outline) -> None:
     """With its bodies and its scan configuration in degrees."""
     assert "cannot be drawn" not in toy_page.text
     assert "drawn to scale" in toy_page.text
-    assert "cylinder, radius 0.010, length 0.100 m" in toy_page.text
+    assert "cylinder r 0.01 m, length 0.1 m" in toy_page.text
     assert "joint_1 60.0°" in toy_page.text
 
 

@@ -7,7 +7,9 @@ import pytest
 from matplotlib.figure import Figure
 
 from reachmap.cell.loading import read_cell
-from reachmap.core.collision.solids import SolidCell, box_triangles, capsule_triangles
+from reachmap.cell.model.fields import Shape, SphereShape
+from reachmap.cell.model.shapes import triangles_of
+from reachmap.core.collision.solids import SolidCell
 from reachmap.plots.cell.cell_view import draw_cell
 from reachmap.plots.cell.raster import (
     Facets,
@@ -24,11 +26,17 @@ RED, BLUE = np.array([0.9, 0.1, 0.1]), np.array([0.1, 0.1, 0.9])
 TOP = Window(axes=view_axes(-90.0, 90.0), low=np.full(2, -1.0), high=np.full(2, 1.0))
 
 
+def surface(shape: Shape) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices and triangles of a shape."""
+    mesh = triangles_of(shape)
+    return mesh.vertices, mesh.triangles
+
+
 def box(x: float, z: float, side: float, rgb: np.ndarray, owner: int) -> Facets:
     """A cube above the point (x, 0)."""
     T = np.eye(4)
     T[:3, 3] = x, 0.0, z
-    return facets_of(*box_triangles(np.full(3, side)), T, rgb, owner)
+    return facets_of(*surface(Shape(box=(side,) * 3)), T, rgb, owner)
 
 
 def test_axes_are_right_handed_and_show_x_to_the_right() -> None:
@@ -59,14 +67,14 @@ def test_area_is_to_scale() -> None:
 
 def test_small_and_large_facets_agree() -> None:
     """A ball of many small triangles has the outline of a disc."""
-    ball = facets_of(*capsule_triangles(0.7, 0.0), np.eye(4), RED, 0)
+    ball = facets_of(*surface(Shape(sphere=SphereShape(radius=0.7))), np.eye(4), RED, 0)
     area = visible_area(ball, TOP, 80.0)[0] / 80.0**2
     assert area == pytest.approx(np.pi * 0.49, rel=0.02)
 
 
 def test_round_surfaces_are_smooth_and_edges_sharp() -> None:
     """Normals of a ball are radial; those of a box are those of its faces."""
-    ball = facets_of(*capsule_triangles(0.7, 0.0), np.eye(4), RED, 0)
+    ball = facets_of(*surface(Shape(sphere=SphereShape(radius=0.7))), np.eye(4), RED, 0)
     radial = ball.corners / np.linalg.norm(ball.corners, axis=-1, keepdims=True)
     assert (radial * ball.normals).sum(axis=-1).min() > 0.98
     cube = box(0.0, 0.0, 1.0, RED, 0)

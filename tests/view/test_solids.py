@@ -6,40 +6,45 @@ import numpy as np
 import pytest
 
 from reachmap.cell.loading import read_cell
-from reachmap.core.collision.solids import (
-    SolidCell,
-    Triangles,
-    box_triangles,
-    capsule_triangles,
-    cylinder_triangles,
+from reachmap.cell.model.fields import (
+    CapsuleShape,
+    CylinderShape,
+    Shape,
+    SphereShape,
 )
+from reachmap.cell.model.shapes import triangles_of
+from reachmap.core.collision.solids import SolidCell
 from reachmap.geometry import inverse_transform
 from tests.support.scenes import scene_of
 
 
-def volume(shape: Triangles) -> float:
+def volume(shape: Shape) -> float:
     """Enclosed volume by the divergence theorem; positive if faces point outwards."""
-    vertices, triangles = shape
+    surface = triangles_of(shape)
+    vertices, triangles = surface.vertices, surface.triangles
     a, b, c = (vertices[triangles[:, k]] for k in range(3))
     return float((np.cross(a, b) * c).sum() / 6.0)
 
 
 def test_box_encloses_its_volume() -> None:
     """Every face of a box points outwards."""
-    assert volume(box_triangles(np.array([0.2, 0.3, 0.5]))) == pytest.approx(0.03)
+    assert volume(Shape(box=(0.2, 0.3, 0.5))) == pytest.approx(0.03)
 
 
 @pytest.mark.parametrize(
     ("shape", "expected"),
     [
-        (cylinder_triangles(0.1, 0.4), np.pi * 0.1**2 * 0.4),
-        (capsule_triangles(0.1, 0.4), np.pi * 0.1**2 * (0.4 + 4 / 3 * 0.1)),
-        (capsule_triangles(0.1, 0.0), 4 / 3 * np.pi * 0.1**3),
+        (Shape(cylinder=CylinderShape(radius=0.1, length=0.4)), np.pi * 0.1**2 * 0.4),
+        (
+            Shape(capsule=CapsuleShape(radius=0.1, length=0.4)),
+            np.pi * 0.1**2 * (0.4 + 4 / 3 * 0.1),
+        ),
+        (Shape(sphere=SphereShape(radius=0.1)), 4 / 3 * np.pi * 0.1**3),
     ],
     ids=["cylinder", "capsule", "sphere"],
 )
 def test_round_shapes_enclose_nearly_their_volume(
-    shape: Triangles, expected: float
+    shape: Shape, expected: float
 ) -> None:
     """48 corners lose less than one percent, and nothing is added."""
     assert 0.985 * expected < volume(shape) <= expected

@@ -203,7 +203,7 @@ def find_doubts(document: Document, cell: Cell, files: CellFiles) -> tuple[str, 
     """Sentences about links that cannot collide, and sizes above 10 m or below 1 mm.
 
     A mesh larger than 100 m, or of no size, is a mistake of the document rather than a
-    doubt; so is an arm that can be seen, but not collide.
+    doubt.
     """
     doubts: list[str] = []
     for index, body in enumerate(cell.bodies):
@@ -240,13 +240,11 @@ def _links_unchecked(
     still = {*WORLD, *robot.fixed_to(robot.root)}
     carried = {*(c.link for c in robot.collisions), *(b.attach_to for b in cell.bodies)}
     if carried <= still and not still.issuperset(unseen):
-        document.add(
-            location,
-            f"no link that moves has a <collision> element ({shown}: <visual> only), "
-            "so no collision of the arm would be found; add collision shapes to the "
-            "URDF, or to bodies of the cell",
-        )
-        return []
+        return [
+            f"{document.place(location)}: NOTHING OF THE ARM IS CHECKED for collision: "
+            f"no link that moves has a <collision> element ({shown}: <visual> only); "
+            "add such elements, or bodies attached to the links"
+        ]
     return [
         f"{document.place(location)}: no <collision> element, so never checked: {shown}"
     ]

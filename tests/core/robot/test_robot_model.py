@@ -34,7 +34,7 @@ def test_shipped_cells_give_arms(name: str, dof: int) -> None:
 
 
 def test_joints_are_in_chain_order_and_limits_are_the_tightest() -> None:
-    """The cell's limits tighten the URDF's, and the scaling slows motions by its inverse."""
+    """The cell's limits tighten the URDF's, and the scaling slows motions."""
     arm = ur5(
         limits={
             "velocity_rad_s": {"elbow_joint": 1.0},

@@ -61,7 +61,9 @@ def read_mesh(data: bytes, suffix: str) -> TriangleMesh:
         wanted = ", ".join(readers)
         raise MeshError(f"{known}; export it as one of {wanted}")
     try:
-        vertices, triangles = reader(data)
+        # What overflows is found among the vertices that are not finite.
+        with np.errstate(all="ignore"):
+            vertices, triangles = reader(data)
     except MeshError:
         raise
     except (ValueError, IndexError, OverflowError, KeyError, MemoryError) as error:

@@ -52,7 +52,9 @@ class JointLimits(Record):
         description="Joint to [low, high] [deg; m for a prismatic joint].",
     )
     scaling: Annotated[float, Field(gt=0, le=1)] = Field(
-        1.0, description="Speed-slider factor on velocities and accelerations."
+        1.0,
+        description="Motions take 1/scaling times as long: factor on velocities, its "
+        "square on accelerations.",
     )
 
 
