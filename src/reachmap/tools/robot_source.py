@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from reachmap.cell.files.collisions import mesh_scales
 from reachmap.cell.files.moveit_config import find_moveit_config
 from reachmap.cell.files.planning_scene import SceneBody, read_scene
 from reachmap.cell.files.resources import SCHEME, NotFoundError, Resolver
@@ -160,7 +161,11 @@ def _check_arguments(given: Mapping[str, str], expansions: list[Expansion]) -> N
 
 def _packages_of(found: RobotSource, expansions: list[Expansion]) -> list[str]:
     """Names of the packages that a robot refers to."""
-    references = [found.urdf, *found.robot.collision_meshes, *found.robot.visual_meshes]
+    references = [
+        found.urdf,
+        *mesh_scales(found.robot.collisions),
+        *found.robot.visual_meshes,
+    ]
     names = [
         text.removeprefix(SCHEME).split("/")[0]
         for text in references

@@ -77,6 +77,8 @@ class UrdfDescription:
     root : str
         The link that is nobody's child.
     collisions : tuple of LinkShape
+    visual_meshes : tuple of str
+        Mesh references of visual elements, each once.
     links_without_collision : tuple of str
         Links that can be seen, but have no collision element.
     notes : tuple of str
@@ -88,6 +90,7 @@ class UrdfDescription:
     joints: dict[str, UrdfJoint]
     root: str
     collisions: tuple[LinkShape, ...] = ()
+    visual_meshes: tuple[str, ...] = ()
     links_without_collision: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
 
@@ -172,6 +175,12 @@ def parse_urdf(text: str, label: str) -> UrdfDescription:
         joints={joint.name: joint for joint in joints},
         root=next(link for link in links if link not in children),
         collisions=collisions,
+        visual_meshes=tuple(
+            dict.fromkeys(
+                mesh.get("filename", "")
+                for mesh in root.iterfind("link/visual/geometry/mesh")
+            )
+        ),
         links_without_collision=links_without_collision(root),
         notes=tuple(f"{label}: {note}" for note in notes),
     )
