@@ -93,8 +93,7 @@ def _state(information: Any, q: FloatArray) -> Any:
 def sample_goals(scene: Scene) -> tuple[Survey, list[FloatArray]]:
     """Goal sets of random test grasps that have goals."""
     cell = scene.loaded.cell
-    axis = cell.robot.tcp.approach_axis
-    grid = bin_test_frames(cell.bin_scan, cell.bin, axis, scene.T_base_bin).frames
+    grid = bin_test_frames(cell, scene.T_base_bin).frames
     rows = np.random.default_rng(0).permutation(grid.size)[: 2 * SAMPLE]
     T, approach_m = grid.transforms_at(rows), cell.bin_scan.approach_distance_m
     survey = survey_frames(scene, T, approach_m)

@@ -33,7 +33,7 @@ def scan(overrides: Sequence[str], workers: int) -> tuple[int, int, dict[str, fl
     loaded = read_cell(CELL, overrides)
     scene = Scene.build(loaded, with_bin=False)
     spec = loaded.cell.workspace_scan
-    cubes = workspace_frames(spec, loaded.cell.robot.tcp.approach_axis)
+    cubes = workspace_frames(loaded.cell)
     context = SurveyContext(
         loaded=loaded,
         with_bin=False,
@@ -63,7 +63,7 @@ def per_frame_cpu_s(sample: int) -> float:
     loaded = read_cell(CELL, ("planner.straight_first=false",))
     scene = Scene.build(loaded, with_bin=False)
     cell = scene.loaded.cell
-    cubes = workspace_frames(cell.workspace_scan, cell.robot.tcp.approach_axis)
+    cubes = workspace_frames(cell)
     poses = np.concatenate([c.frames.transforms().reshape(-1, 4, 4) for c in cubes])
     rows = np.random.default_rng(0).permutation(len(poses))[:sample]
     begin = time.process_time()

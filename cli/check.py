@@ -53,7 +53,9 @@ def _lines(answer: CellCheck, *, verbose: bool) -> Iterator[str]:
     direction = ", ".join(f"{v:.3f}" for v in answer.approach_at_scan)
     yield f"cell    {answer.name}  (sha256 {answer.sha256[:12]})"
     yield f"robot   {answer.robot}"
-    yield f"base    {answer.base_frame}"
+    tilt = answer.base_tilt_deg
+    leans = f", leans {tilt:g} deg off the world's vertical" if tilt else ""
+    yield f"base    {answer.base_frame}{leans}"
     yield f"tcp     on {answer.tcp_parent}, approach {answer.approach_axis}"
     yield f"        at the scan configuration ({point}) m, approaching ({direction})"
     yield f"ik      {answer.ik_method}, {exact}"

@@ -18,6 +18,10 @@ AXES: dict[str, tuple[int, float]] = {
     for sign in "+-"
 }
 
+# A frame that leans less than this stands upright; of two axes that lie equally flat
+# within TIE the first counts; what is as near to a whole number as DUST is that.
+UPRIGHT_RAD, TIE, DUST = 1e-9, 1e-6, 1e-12
+
 
 def transform_from_parts(R: FloatArray, p: FloatArray) -> FloatArray:
     """Assemble homogeneous matrices.
@@ -138,6 +142,45 @@ def direction_angle(a: FloatArray, b: FloatArray) -> FloatArray:
     chord = np.linalg.norm(a - b, axis=-1)
     total = np.linalg.norm(a + b, axis=-1)
     return np.asarray(2.0 * np.arctan2(chord, total))
+
+
+def upright_rotation(R_world_frame: FloatArray) -> FloatArray:
+    """Rotation that stands a frame upright in the world, its heading kept.
+
+    The upright frame has z along the world's vertical. Its x axis is the horizontal
+    direction of the frame's own x, or square to that of its y where y lies flatter: a
+    frame tipped about one of its axes keeps that axis. Turning the frame about the
+    vertical turns the upright frame with it.
+
+    Parameters
+    ----------
+    R_world_frame : array, shape (3, 3)
+
+    Returns
+    -------
+    array, shape (3, 3)
+        R_frame_upright; exactly the identity where the frame stands upright.
+    """
+    R = np.asarray(R_world_frame, float)
+    if np.hypot(R[0, 2], R[1, 2]) < UPRIGHT_RAD and R[2, 2] > 0:
+        return np.eye(3)
+    flat_x, flat_y = np.hypot(R[0, :2], R[1, :2])
+    if flat_x >= flat_y - TIE:
+        heading = np.arctan2(R[1, 0], R[0, 0])
+    else:
+        heading = np.arctan2(-R[0, 1], R[1, 1])
+    c, s = np.cos(heading), np.sin(heading)
+    upright = R.T @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    # sin(180 deg) is 1e-16 in floating point; axes that coincide should do so exactly.
+    whole = np.round(upright)
+    clean = np.where(np.abs(upright - whole) < DUST, whole, upright)
+    return np.asarray(clean + 0.0)
+
+
+def tilt_rad(R_world_frame: FloatArray) -> float:
+    """Angle between a frame's z axis and the world's vertical [rad]."""
+    x, y, z = R_world_frame[:, 2]
+    return float(np.arctan2(np.hypot(x, y), z))
 
 
 def yaw_transform(x: float, y: float, z: float, yaw_rad: float) -> FloatArray:

@@ -2,16 +2,30 @@
 
 import numpy as np
 
-from reachmap.cell.model.cell import BinScanSpec, BinSpec, CubeSpec, WorkspaceScanSpec
+from reachmap.cell.model.cell import (
+    BinScanSpec,
+    BinSpec,
+    Cell,
+    CubeSpec,
+    RobotSpec,
+    TcpSpec,
+    WorkspaceScanSpec,
+)
 from reachmap.geometry import yaw_transform
 from reachmap.sampling.frames import bin_test_frames, cell_centres, workspace_frames
 
-BIN = BinSpec(inner=(0.36, 0.26, 0.15))
+ARM = RobotSpec(urdf="arm.urdf", tcp=TcpSpec(parent="tool"))
+
+
+def cell_of(**sections) -> Cell:
+    """The few sections of a cell that say where its test frames are."""
+    bin_spec = BinSpec(inner=(0.36, 0.26, 0.15))
+    return Cell.model_construct(**{"robot": ARM, "bin": bin_spec, **sections})
 
 
 def test_the_bin_grid_is_cell_centred() -> None:
     """20 along the 0.36 m side, 14 along the 0.26 m side, half a pitch off a wall."""
-    frames = bin_test_frames(BinScanSpec(), BIN, "+z", np.eye(4))
+    frames = bin_test_frames(cell_of(bin_scan=BinScanSpec()), np.eye(4))
     assert frames.T_base_tcp.shape == (1, 14, 20, 27, 4, 4)
     np.testing.assert_allclose(np.diff(frames.x), 0.018)
     np.testing.assert_allclose(frames.x[[0, -1]], [-0.171, 0.171])
@@ -21,10 +35,10 @@ def test_the_bin_grid_is_cell_centred() -> None:
 
 def test_frames_move_and_turn_with_the_bin() -> None:
     """Poses in another bin pose are that pose times the poses of the bin at home."""
-    spec = BinScanSpec(grid=(4, 3), layers=(0.02, 0.1))
+    cell = cell_of(bin_scan=BinScanSpec(grid=(4, 3), layers=(0.02, 0.1)))
     T_base_bin = yaw_transform(0.5, -0.2, 0.1, 0.7)
-    home = bin_test_frames(spec, BIN, "+z", np.eye(4)).T_base_tcp
-    moved = bin_test_frames(spec, BIN, "+z", T_base_bin).T_base_tcp
+    home = bin_test_frames(cell, np.eye(4)).T_base_tcp
+    moved = bin_test_frames(cell, T_base_bin).T_base_tcp
     np.testing.assert_allclose(moved, T_base_bin @ home, atol=1e-15)
     np.testing.assert_allclose(home[1, 2, 3, 0, :3, 3], [0.135, 0.26 / 3, 0.1])
 
@@ -43,7 +57,8 @@ def test_workspace_frames_hold_one_grid_per_cube() -> None:
         CubeSpec(name="right", min=(0, -1, 0), max=(1, 0, 0.2), grid=(3, 2)),
         CubeSpec(name="left", min=(0, 0, 0), max=(1, 1, 0.2), grid=(3, 2)),
     )
-    right, left = workspace_frames(WorkspaceScanSpec(cubes=cubes, z_step=0.1), "+z")
+    spec = WorkspaceScanSpec(cubes=cubes, z_step=0.1)
+    right, left = workspace_frames(cell_of(workspace_scan=spec))
     assert (right.name, left.name) == ("right", "left")
     assert right.frames.shape == (3, 2, 3, 27)
     T = right.frames.transforms()
@@ -53,7 +68,11 @@ def test_workspace_frames_hold_one_grid_per_cube() -> None:
 
 def test_chosen_frames_equal_the_full_product() -> None:
     """Poses by flat index, as a slice and as an array, are those of the whole."""
-    frames = bin_test_frames(BinScanSpec(grid=(3, 2)), BIN, "-y", np.eye(4)).frames
+    cell = cell_of(
+        bin_scan=BinScanSpec(grid=(3, 2)),
+        robot=RobotSpec(urdf="a", tcp=TcpSpec(parent="t", approach_axis="-y")),
+    )
+    frames = bin_test_frames(cell, np.eye(4)).frames
     whole = frames.transforms().reshape(-1, 4, 4)
     assert frames.size == len(whole)
     np.testing.assert_array_equal(frames.transforms_at(slice(20, 40)), whole[20:40])

@@ -32,7 +32,7 @@ def test_the_roadmap_misses_nothing_that_planning_finds():
     """On 300 random frames, what plans reach is connected; the rest has a path."""
     scene = scene_of("ur5-eye-in-hand", with_bin=False)
     cell = scene.loaded.cell
-    cubes = workspace_frames(cell.workspace_scan, cell.robot.tcp.approach_axis)
+    cubes = workspace_frames(cell)
     poses = np.concatenate([c.frames.transforms().reshape(-1, 4, 4) for c in cubes])
     survey = survey_frames(scene, poses, 0.0)
     connection = connect_survey(scene, survey, seed=1)
@@ -58,8 +58,7 @@ def test_another_seed_reaches_the_same_test_grasps():
     scene = scene_of("ur5-eye-in-hand")
     other = scene_of("ur5-eye-in-hand", "seed=99")
     cell = scene.loaded.cell
-    axis = cell.robot.tcp.approach_axis
-    grid = bin_test_frames(cell.bin_scan, cell.bin, axis, scene.T_base_bin).frames
+    grid = bin_test_frames(cell, scene.T_base_bin).frames
     rows = np.random.default_rng(12).permutation(grid.size)[:200]
     survey = survey_frames(
         scene, grid.transforms_at(rows), cell.bin_scan.approach_distance_m

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from reachmap.cell.model.cell import BinScanSpec, BinSpec
+from reachmap.cell.model.cell import BinScanSpec, BinSpec, Cell, RobotSpec, TcpSpec
 from reachmap.cell.model.orientations import ConeFamily
 from reachmap.geometry import quaternion_wxyz_from_rotation, yaw_transform
 from reachmap.maps.format.checks import path_lengths
@@ -49,8 +49,6 @@ CELL = Path(__file__).parents[2] / "cells" / "ur5-eye-in-hand.yaml"
 def cell_json() -> str:
     """The shipped cell as resolved JSON, without looking up its meshes."""
     from ruamel.yaml import YAML
-
-    from reachmap.cell.model.cell import Cell
 
     raw = YAML(typ="safe", pure=True).load(CELL.read_text(encoding="utf-8"))
     return Cell.model_validate(raw).model_dump_json()
@@ -231,8 +229,12 @@ def synthetic_bin_map(
         layers=tuple(0.05 * (1 + np.arange(nl))),
         orientations=ConeFamily(tilts_deg=(20.0,), azimuths=(no,), rolls=1),
     )
-    bin_spec = BinSpec(inner=(0.36, 0.26, 0.15))
-    frames = bin_test_frames(spec, bin_spec, "+z", T_base_bin)
+    cell = Cell.model_construct(
+        robot=RobotSpec(urdf="arm.urdf", tcp=TcpSpec(parent="tool")),
+        bin=BinSpec(inner=(0.36, 0.26, 0.15)),
+        bin_scan=spec,
+    )
+    frames = bin_test_frames(cell, T_base_bin)
     T = frames.T_base_tcp
     proved = found.any(axis=-1) if connected is None else np.asarray(connected, bool)
     status = statuses(found.any(axis=-1) | proved) if status is None else status
@@ -249,7 +251,7 @@ def synthetic_bin_map(
         y=frames.y,
         x=frames.x,
         bin_pose=np.array(T_base_bin),
-        bin_inner=np.array(bin_spec.inner),
+        bin_inner=np.array(cell.bin.inner),
         position=np.array(T[..., 0, :3, 3]),
         quaternion_wxyz=quaternion_wxyz_from_rotation(T[..., :3, :3]),
         approach_axis="+z",

@@ -128,7 +128,11 @@ class LoadedCell:
                 ),
             )
             cell = cell.model_copy(
-                update={"bin": cell.bin.model_copy(update={"pose": pose})}
+                update={
+                    "bin": cell.bin.model_copy(
+                        update={"pose": pose, "frame": "robot_base"}
+                    )
+                }
             )
         if scan_configuration_rad is not None:
             q = {name: float(value) for name, value in scan_configuration_rad.items()}

@@ -11,6 +11,7 @@ from reachmap.cell.files.files import compare_hashes, read_files, stored_files
 from reachmap.cell.files.resources import shipped_folder
 from reachmap.cell.loaded import LoadedCell, fingerprint
 from reachmap.cell.model.cell import Cell
+from reachmap.cell.mounting import check_bin_stands, leaning_levels
 from reachmap.cell.references import check_names, find_doubts
 from reachmap.cell.resolution import resolved_cell, validated
 from reachmap.cell.text.expressions import resolve_expressions, restore_expressions
@@ -109,6 +110,9 @@ def cell_from_text(
     if cell is None or files.robot is None:
         raise CellError(f"{label}: cannot be loaded")
     resolved = resolved_cell(document, cell, files, directory)
+    leaning = leaning_levels(resolved)
+    if leaning:
+        warnings = (*warnings, f"{label}: {leaning}")
     return LoadedCell(
         cell=resolved,
         source=source or label,
@@ -187,6 +191,8 @@ def cell_from_json(
     if files.robot is not None:
         check_names(document, files.robot, files.srdf_description)
     compare_hashes(document, files, files_sha256 or {})
+    if changes:
+        check_bin_stands(document, cell)
     document.raise_mistakes()
     return LoadedCell(
         cell=cell,

@@ -13,6 +13,7 @@ from reachmap.cell.files.files import CellFiles
 from reachmap.cell.files.joint_limits import tighten_limits
 from reachmap.cell.files.resources import SCHEME, SHIPPED, Resolver, shipped_folder
 from reachmap.cell.model.cell import Cell
+from reachmap.cell.mounting import check_bin_stands, write_out_base_pose
 from reachmap.cell.references import moving_joints
 from reachmap.cell.text.messages import add_validation_errors
 from reachmap.cell.text.yaml_reader import Document
@@ -64,12 +65,16 @@ def resolved_cell(
         moving = moving_joints(data, files.robot, files.srdf_description)
         tighten_limits(robot["limits"], files.joint_limits, files.robot, moving)
         robot["joint_limits"] = None
+        write_out_base_pose(document, data, files.robot)
     try:
-        return cell_from_data(data)
+        resolved = cell_from_data(data)
     except ValidationError as error:
         add_validation_errors(document, error, Cell)
         document.raise_mistakes()
         raise
+    check_bin_stands(document, resolved)
+    document.raise_mistakes()
+    return resolved
 
 
 def _portable(reference: str, resolver: Resolver) -> str:

@@ -76,7 +76,7 @@ class Scene:
             robot,
             bodies,
             cell.collision.safety_margin_m,
-            movable=bin_placements(robot, cell.bin) if bin_moves else (),
+            movable=bin_placements(robot, cell) if bin_moves else (),
         )
         motions = MotionChecker(
             checker,
@@ -93,7 +93,7 @@ class Scene:
             scan_configuration=robot.configuration(
                 loaded.scan_configuration_rad, "scan_configuration"
             ),
-            T_base_bin=cell.bin.pose.matrix(),
+            T_base_bin=cell.T_base_bin(),
             with_bin=with_bin,
         )
 
@@ -109,8 +109,8 @@ class Scene:
         loaded : LoadedCell
             The same cell but for the bin's pose.
         """
-        self.checker.move(bin_placements(self.robot, loaded.cell.bin))
-        T_base_bin = loaded.cell.bin.pose.matrix()
+        self.checker.move(bin_placements(self.robot, loaded.cell))
+        T_base_bin = loaded.cell.T_base_bin()
         return dataclasses.replace(self, loaded=loaded, T_base_bin=T_base_bin)
 
     def require_free_scan_configuration(self) -> None:

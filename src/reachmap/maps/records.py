@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from reachmap._typing import BoolArray, CodeArray, FloatArray, IntArray
+from reachmap.geometry import yaw_transform
 from reachmap.maps.parts import (
     ApproachTimes,
     BestPaths,
@@ -173,8 +174,8 @@ class WorkspaceMap:
     """Path reachability over the cubes, seen from one scan configuration.
 
     ``x``, ``y``, ``z`` and the three percentages are the stitched lattice, where
-    frames of points that cubes share are pooled (Eq. 1). Files of version 1.0 lack
-    ``components`` and ``T_world_base``, shape (4, 4).
+    frames of points that cubes share are pooled (Eq. 1); ``T_base_grid`` (4, 4) is
+    their frame. Files of version 1.0 lack ``components`` and ``T_world_base`` (4, 4).
     """
 
     cubes: Mapping[str, CubeMap]
@@ -193,6 +194,7 @@ class WorkspaceMap:
     run: RunInfo = RunInfo()
     components: Components | None = None
     T_world_base: FloatArray | None = None
+    T_base_grid: FloatArray = field(default_factory=lambda: np.eye(4))
 
     def __post_init__(self) -> None:
         freeze(self)
@@ -300,9 +302,10 @@ class BinPlacement:
     ----------
     bin_pose : array, shape (4, 4)
         T_base_bin of the chosen candidate.
-    scan_configuration : array, shape (dof,)
     candidate_pose : array, shape (n, 4)
-        x, y, z [m], yaw [rad] of each candidate in robot_base.
+        x, y, z [m], yaw [rad] of each candidate in the level frame.
+    T_base_level : array, shape (4, 4)
+        The level frame, which is upright; robot_base where that stands upright.
     score : array, shape (n,)
         Mean path reachability over the pick volume [percent], NaN if excluded.
     worst_point, reachable_share : array, shape (n,)
@@ -312,13 +315,11 @@ class BinPlacement:
     reason : tuple of str
         Why a candidate is excluded, "" if it is not.
     margin : mapping
-        Direction ("+x", "-yaw", …) to how far the bin can move [m or rad] before
-        the score drops by 5 points.
+        Direction ("+x", "-yaw", …) to how far it can move [m, rad] for 5 points.
     tolerance : pair of float, or None
         Shift [m] and turn [rad] under which ``worst_score`` is taken.
     worst_score, score_error : array, shape (n,), or None
-        Least score under the tolerance, and the standard error of ``score``
-        [percent]; NaN if excluded.
+        Least score under the tolerance; standard error of ``score`` [percent].
     support : str or None
         Body that the bin stands on, "" if it stands on none.
     T_world_base : array, shape (4, 4), or None
@@ -346,9 +347,15 @@ class BinPlacement:
     score_error: FloatArray | None = None
     support: str | None = None
     T_world_base: FloatArray | None = None
+    T_base_level: FloatArray = field(default_factory=lambda: np.eye(4))
 
     def __post_init__(self) -> None:
         freeze(self)
+
+    def T_level_bin(self, row: int | None = None) -> FloatArray:  # noqa: N802
+        """The chosen bin, or a candidate's, in the level frame, shape (4, 4)."""
+        row = self.chosen if row is None else row
+        return yaw_transform(*self.candidate_pose[row].tolist())
 
 
 KINDS = ("path", "ik", "ik_free")

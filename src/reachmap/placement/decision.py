@@ -10,7 +10,7 @@ import numpy as np
 from reachmap._typing import FloatArray
 from reachmap.core.collision.bin_fit import BinFit
 from reachmap.errors import SceneError
-from reachmap.geometry import yaw_transform
+from reachmap.geometry import inverse_transform
 from reachmap.placement.mapped.candidates import Candidate, CandidateTable
 from reachmap.placement.mapped.exact import PlacedScene, Pose
 from reachmap.placement.mapped.imaging import UNSEEN
@@ -91,7 +91,7 @@ def decide_as_given(question: Question, pose: Pose) -> Decision:
     SceneError
         The bin would meet something; both are named.
     """
-    contact = question.fit.contact(yaw_transform(*pose))
+    contact = question.fit.contact(question.T_base_bin(pose))
     if contact is not None:
         raise SceneError(f"--bin-pose: {contact.pair}")
     decision = Decision()
@@ -115,8 +115,9 @@ def paper_pose(question: Question) -> Pose | None:
     The centre of the inner bottom is put on the point, at the cell's own angle or, if
     the bin cannot stand there like that, turned by 90 degrees.
     """
-    workspace, bin_pose = question.workspace, question.loaded.cell.bin.pose.matrix()
-    yaw = float(np.arctan2(bin_pose[1, 0], bin_pose[0, 0]))
+    workspace, cell = question.workspace, question.loaded.cell
+    T_level_bin = inverse_transform(cell.T_base_level()) @ cell.T_base_bin()
+    yaw = float(np.arctan2(T_level_bin[1, 0], T_level_bin[0, 0]))
     found: list[Pose] = []
 
     def is_feasible(point: LatticePoint) -> bool:
@@ -219,7 +220,7 @@ def _margins(question: Question, pose: Pose, q: FloatArray) -> dict[str, float]:
     return margins(
         pose,
         q,
-        lambda moved: fit.contact(yaw_transform(*moved)) is None,
+        lambda moved: fit.contact(question.T_base_bin(moved)) is None,
         question.evaluator,
     )
 

@@ -11,11 +11,10 @@ import numpy as np
 from reachmap._typing import BoolArray, FloatArray
 from reachmap.core.collision.bin_fit import BinFit
 from reachmap.core.scene import Scene
-from reachmap.geometry import yaw_transform
 from reachmap.maps.records import WorkspaceMap
 from reachmap.placement.mapped.candidates import Candidate
 from reachmap.placement.mapped.evaluator import Evaluator
-from reachmap.placement.mapped.exact import ALWAYS, Pose
+from reachmap.placement.mapped.exact import ALWAYS, Pose, bin_at
 from reachmap.placement.mapped.imaging import imaging_configurations
 from reachmap.placement.predicted.places import best_at_each_place, pose_grid
 from reachmap.placement.predicted.prediction import field_of, footprint_of, predict
@@ -33,6 +32,7 @@ class Question:
     ----------
     loaded : LoadedCell
     workspace : WorkspaceMap
+        With levels that rise, see :mod:`reachmap.maps.summary.upright`.
     is_open : bool array, shape (layers, y, x, orientations)
         See :func:`reachmap.placement.mapped.sample.open_frames`.
     region : Region
@@ -62,19 +62,23 @@ class Question:
         """Distance of centres from which two bins stand in different places."""
         return max(self.loaded.cell.bin.inner[:2]) / 2
 
+    def T_base_bin(self, pose: Pose) -> FloatArray:  # noqa: N802
+        """The bin at a pose, in robot_base, shape (4, 4)."""
+        return bin_at(self.loaded.cell, pose)
+
     def reason_against(self, pose: Pose) -> str:
         """Why the bin cannot stand at a pose, or ""."""
         outside = self.region.outside(np.array(pose))
         if outside:
             return f"{outside} is outside the region"
-        contact = self.fit.contact(yaw_transform(*pose))
+        contact = self.fit.contact(self.T_base_bin(pose))
         return "" if contact is None else contact.reason
 
     def can_be_imaged(self, pose: Pose) -> bool:
         """Whether some scan configuration, or the one that stays, images the bin."""
         if self.keep_scan:
             return True
-        changed = self.loaded.with_changes(bin_pose=yaw_transform(*pose))
+        changed = self.loaded.with_changes(bin_pose=self.T_base_bin(pose))
         found = imaging_configurations(self.moving.with_bin_of(changed))
         return next(found, None) is not None
 

@@ -19,6 +19,7 @@ from reachmap.plots.comparison import MapChange, draw_change_sheet, draw_compari
 from reachmap.plots.heatmap import draw_level
 from reachmap.plots.overview import draw_overview
 from reachmap.plots.parts.bin_view import percent_after
+from reachmap.plots.parts.context import levels_of
 from reachmap.plots.parts.files import Picture, Table, level_table
 from reachmap.plots.parts.levels import QUANTITY_NAMES, Quantity, level_names
 from reachmap.plots.parts.stack import LevelStack, level_title, stack_of
@@ -55,6 +56,7 @@ def workspace_album(
     SettingsError
         A height is no level of the map.
     """
+    workspace = levels_of(workspace)
     levels = find_levels(workspace.z, heights)
     items: list[Picture | Table] = []
     for quantity in quantities:

@@ -12,9 +12,8 @@ from matplotlib.lines import Line2D
 from matplotlib.patheffects import withStroke
 
 from reachmap._typing import BoolArray, FloatArray
-from reachmap.geometry import yaw_transform
 from reachmap.maps.records import BinPlacement, WorkspaceMap
-from reachmap.plots.parts.context import CellContext, context_of
+from reachmap.plots.parts.context import CellContext, context_of, levels_of
 from reachmap.plots.parts.outlines import (
     Kind,
     Outline,
@@ -68,10 +67,11 @@ def draw_placement(
         The map it was chosen from; without it the bin stands on an empty level.
     camera_view : array, shape (n, 2), optional
         What the camera sees from the scan configuration on the height of the rim, in
-        robot_base [m].
+        the level frame [m].
     percent_map : str
     """
     context = context_of(placement.provenance)
+    workspace = None if workspace is None else levels_of(workspace)
     stack = _stack(placement, workspace, context)
     low, high = _view(placement, stack)
     scale_in = min(WIDEST / (high[0] - low[0]), TALLEST / (high[1] - low[1]))
@@ -85,7 +85,7 @@ def draw_placement(
         axes_at(figure, LEFT + column * (width + GAP), bottom, width, height)
         for column in range(count)
     ]
-    level = int(np.abs(stack.z - placement.bin_pose[2, 3]).argmin())
+    level = int(np.abs(stack.z - placement.T_level_bin()[2, 3]).argmin())
     if workspace is not None:
         # Without numbers, which would vanish under the outlines of the bins.
         draw_squares(
@@ -126,8 +126,8 @@ def draw_placement(
 
 def placement_words(placement: BinPlacement) -> tuple[str, str]:
     """Title and subtitle: where the bin goes, and its score."""
-    x, y, z = placement.bin_pose[:3, 3]
-    yaw = np.degrees(np.arctan2(placement.bin_pose[1, 0], placement.bin_pose[0, 0]))
+    x, y, z = placement.T_level_bin()[:3, 3]
+    yaw = np.degrees(placement.candidate_pose[placement.chosen, 3])
     title = (
         f"Bin at x = {_length(x)}, y = {_length(y)}, z = {_length(z)} m, "
         f"yaw {round(float(yaw)) + 0:d}°"
@@ -156,7 +156,7 @@ def _stack(
         return LevelStack(
             x=_ends(placement.candidate_pose[:, 0]),
             y=_ends(placement.candidate_pose[:, 1]),
-            z=placement.bin_pose[2:3, 3],
+            z=placement.T_level_bin()[2:3, 3],
             values=np.full((1, 2, 2), np.nan),
             quantity="path",
             outlines=context.standing,
@@ -200,7 +200,7 @@ def _draw_bins(
     """Draw the bins and what the camera sees; return their legend."""
     outlines = _bins(placement, context)
     if camera_view is not None:
-        z = float(placement.bin_pose[2, 3])
+        z = float(placement.T_level_bin()[2, 3])
         outlines.append(
             Outline(
                 name="camera view",
@@ -229,18 +229,20 @@ def _bins(placement: BinPlacement, context: CellContext) -> list[Outline]:
     for index, name, kind in others:
         if index < 0 or index == placement.chosen:
             continue
-        T = yaw_transform(*(float(v) for v in placement.candidate_pose[index]))
+        T = placement.T_level_bin(index)
         outlines.append(bin_outlines(spec, T, name=name, kind=kind)[0])
     outlines += bin_outlines(
-        spec, placement.bin_pose, name="chosen bin (arrow: its x axis)"
+        spec,
+        placement.T_level_bin(),
+        name="chosen bin (arrow: its x axis)",
     )
     return outlines
 
 
 def _draw_bin_axis(axes: Axes, placement: BinPlacement) -> None:
     """Arrow along the bin's x axis from its centre."""
-    centre = placement.bin_pose[:2, 3]
-    tip = centre + 0.10 * placement.bin_pose[:2, 0]
+    centre = placement.T_level_bin()[:2, 3]
+    tip = centre + 0.10 * placement.T_level_bin()[:2, 0]
     axes.annotate(
         "",
         xy=(float(tip[0]), float(tip[1])),
@@ -291,7 +293,7 @@ def _draw_candidates(
         linewidths=0.9,
         zorder=4,
     )
-    x, y = placement.bin_pose[:2, 3]
+    x, y = placement.T_level_bin()[:2, 3]
     for colour, line in (("white", 4.5), (BIN_COLOUR, 2.2)):
         axes.plot(
             [x],

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from reachmap._typing import FloatArray, IntArray
-from reachmap.cell.model.cell import BinScanSpec, BinSpec, WorkspaceScanSpec
+from reachmap.cell.model.cell import Cell
 from reachmap.geometry import quaternion_wxyz_from_rotation, transform_from_parts
 from reachmap.sampling.lattice import Lattice, cube_lattice
-from reachmap.sampling.orientations import orientation_set
+from reachmap.sampling.orientations import orientation_set, reference_rotation
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -96,43 +96,47 @@ class BinFrames:
         return self.frames.transforms()
 
 
-def workspace_frames(
-    spec: WorkspaceScanSpec, approach_axis: str
-) -> tuple[CubeFrames, ...]:
-    """Test frames of each cube; orientations are given in robot_base."""
-    R = orientation_set(spec.orientations, approach_axis)
+def workspace_frames(cell: Cell) -> tuple[CubeFrames, ...]:
+    """Test frames of each cube of a cell's workspace scan."""
+    spec, T_base_grid = cell.workspace_scan, cell.T_base_grid()
+    R_base_reference = reference_rotation(
+        spec.orientations, cell, np.eye(3), cell.T_base_bin()[:3, :3]
+    )
+    R_reference_tcp = orientation_set(spec.orientations, cell.robot.tcp.approach_axis)
     cubes = []
     for cube in spec.cubes:
         lattice = cube_lattice(cube, spec.z_step)
-        frames = FrameGrid(points=lattice.points(), orientations=R)
+        frames = FrameGrid(
+            points=lattice.points() @ T_base_grid[:3, :3].T + T_base_grid[:3, 3],
+            orientations=R_base_reference @ R_reference_tcp,
+        )
         cubes.append(CubeFrames(name=cube.name, lattice=lattice, frames=frames))
     return tuple(cubes)
 
 
-def bin_test_frames(
-    spec: BinScanSpec, bin_spec: BinSpec, approach_axis: str, T_base_bin: FloatArray
-) -> BinFrames:
-    """Test frames inside a bin; orientations turn with the bin.
+def bin_test_frames(cell: Cell, T_base_bin: FloatArray) -> BinFrames:
+    """Test frames inside a bin; orientations turn with the bin about the vertical.
 
     Parameters
     ----------
-    spec : BinScanSpec
-        Grid (points along the bin's x and y), layers, orientations.
-    bin_spec : BinSpec
-        Inner size; its own pose is not used.
-    approach_axis : str
-        TCP axis into the object, as in ``"+z"``.
+    cell : Cell
+        Its own bin pose is not used.
     T_base_bin : array, shape (4, 4)
         Pose of the bin frame in robot_base.
     """
-    x = cell_centres(bin_spec.inner[0], spec.grid[0])
-    y = cell_centres(bin_spec.inner[1], spec.grid[1])
+    spec = cell.bin_scan
+    x = cell_centres(cell.bin.inner[0], spec.grid[0])
+    y = cell_centres(cell.bin.inner[1], spec.grid[1])
     layer = np.array(spec.layers, float)
     p_bin = Lattice(x=x, y=y, z=layer).points()
-    R_bin = orientation_set(spec.orientations, approach_axis)
+    R_base_bin = T_base_bin[:3, :3]
+    R_base_reference = reference_rotation(
+        spec.orientations, cell, R_base_bin, R_base_bin
+    )
+    R_reference_tcp = orientation_set(spec.orientations, cell.robot.tcp.approach_axis)
     frames = FrameGrid(
-        points=p_bin @ T_base_bin[:3, :3].T + T_base_bin[:3, 3],
-        orientations=T_base_bin[:3, :3] @ R_bin,
+        points=p_bin @ R_base_bin.T + T_base_bin[:3, 3],
+        orientations=R_base_reference @ R_reference_tcp,
     )
     return BinFrames(layer=layer, y=y, x=x, frames=frames)
 

@@ -1,6 +1,7 @@
 """Families of tool orientations as rotation matrices.
 
-The reference frame has z up: robot_base for the workspace, the bin frame for the bin.
+They are about the z axis of a reference frame, which is the world's vertical unless a
+family names another.
 """
 
 from __future__ import annotations
@@ -9,8 +10,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from reachmap._typing import FloatArray
+from reachmap.cell.model.cell import Cell
 from reachmap.cell.model.orientations import ConeFamily, ListFamily
-from reachmap.geometry import AXES, rotation_from_rpy_deg
+from reachmap.geometry import AXES, rotation_from_rpy_deg, upright_rotation
 
 
 def orientation_set(
@@ -47,6 +49,33 @@ def orientation_set(
             roll = Rotation.from_rotvec(np.outer(np.radians(rolls_deg), approach))
             blocks.append(roll.as_matrix() @ (tilt @ upright))
     return np.concatenate(blocks)
+
+
+def reference_rotation(
+    family: ConeFamily | ListFamily,
+    cell: Cell,
+    R_base_own: FloatArray,
+    R_base_bin: FloatArray,
+) -> FloatArray:
+    """R_base_reference of a family, shape (3, 3).
+
+    Parameters
+    ----------
+    family : ConeFamily or ListFamily
+    cell : Cell
+    R_base_own : array, shape (3, 3)
+        What is scanned, in robot_base: the identity for the workspace, the bin for the
+        bin. A family about the world's vertical takes its heading from it.
+    R_base_bin : array, shape (3, 3)
+    """
+    if family.reference == "robot_base":
+        return np.eye(3)
+    if family.reference == "bin":
+        return R_base_bin
+    if family.reference is None:
+        return R_base_own
+    R_world_base = cell.robot.base_pose.matrix()[:3, :3]
+    return R_base_own @ upright_rotation(R_world_base @ R_base_own)
 
 
 def straight_down_orientation(approach_axis: str) -> FloatArray:

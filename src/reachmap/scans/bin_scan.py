@@ -122,9 +122,8 @@ def assemble_bin_map(
     run : RunInfo
     """
     cell = Cell.model_validate_json(document["provenance"]["cell_resolved_json"])
-    T_base_bin = cell.bin.pose.matrix()
-    axis = cell.robot.tcp.approach_axis
-    grid = bin_test_frames(cell.bin_scan, cell.bin, axis, T_base_bin)
+    T_base_bin = cell.T_base_bin()
+    grid = bin_test_frames(cell, T_base_bin)
     shape = grid.frames.shape
 
     def shaped(values: Any) -> Any:
@@ -142,6 +141,7 @@ def assemble_bin_map(
         approach=measured.pop("approach_time"), retreat=measured.pop("retreat_time")
     )
     return BinMap(
+        T_world_base=cell.robot.base_pose.matrix(),
         layer=grid.layer,
         y=grid.y,
         x=grid.x,
@@ -149,7 +149,7 @@ def assemble_bin_map(
         bin_inner=np.array(cell.bin.inner),
         position=grid.frames.points,
         quaternion_wxyz=quaternion.copy(),
-        approach_axis=axis,
+        approach_axis=cell.robot.tcp.approach_axis,
         approach_distance=cell.bin_scan.approach_distance_m,
         status=shaped(results.status),
         blocking_pair=shaped(results.blocking_pair),

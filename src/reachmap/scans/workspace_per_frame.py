@@ -62,14 +62,14 @@ def per_frame_work(
 
 def frames_of_cell(cell: Cell) -> int:
     """Number of test frames of a cell's workspace scan."""
-    cubes = workspace_frames(cell.workspace_scan, cell.robot.tcp.approach_axis)
+    cubes = workspace_frames(cell)
     return sum(cube.frames.size for cube in cubes)
 
 
 def prepare(context: PerFrameContext) -> _State:
     """Build scene and frames, once per worker."""
     cell = context.loaded.cell
-    cubes = workspace_frames(cell.workspace_scan, cell.robot.tcp.approach_axis)
+    cubes = workspace_frames(cell)
     return _State(
         scene=Scene.build(context.loaded, with_bin=context.with_bin),
         poses=np.concatenate([c.frames.transforms().reshape(-1, 4, 4) for c in cubes]),

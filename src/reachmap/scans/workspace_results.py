@@ -97,7 +97,7 @@ def assemble_workspace_map(
         Evidence of the roadmap.
     """
     cell = Cell.model_validate_json(document["provenance"]["cell_resolved_json"])
-    cubes = workspace_frames(cell.workspace_scan, cell.robot.tcp.approach_axis)
+    cubes = workspace_frames(cell)
     maps: dict[str, CubeMap] = {}
     begin = 0
     for cube in cubes:
@@ -111,6 +111,8 @@ def assemble_workspace_map(
         body_pairs=tuple(document["body_pairs"]),
         method=document["method"],
         components=components,
+        T_world_base=cell.robot.base_pose.matrix(),
+        T_base_grid=cell.T_base_grid(),
         stamp=Stamp(**document["stamp"]),
         provenance=provenance_from_document(document),
         run=run,

@@ -188,9 +188,7 @@ def _connected(scene: Scene, survey: Survey, progress: Progress) -> BoolArray:
 
 
 def _grid(loaded: LoadedCell, scene: Scene) -> FrameGrid:
-    cell = loaded.cell
-    axis = cell.robot.tcp.approach_axis
-    return bin_test_frames(cell.bin_scan, cell.bin, axis, scene.T_base_bin).frames
+    return bin_test_frames(loaded.cell, scene.T_base_bin).frames
 
 
 def _survey_context(loaded: LoadedCell, scene: Scene) -> SurveyContext:

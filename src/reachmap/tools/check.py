@@ -11,7 +11,7 @@ from reachmap._typing import FloatArray
 from reachmap.cell.loading import LoadedCell, read_cell
 from reachmap.cell.model.shapes import shape_text
 from reachmap.core.scene import Scene
-from reachmap.geometry import AXES
+from reachmap.geometry import AXES, tilt_rad
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,6 +47,8 @@ class CellCheck:
 
     Attributes
     ----------
+    base_tilt_deg : float
+        Angle of robot_base's z axis from the world's vertical.
     tcp_at_scan_m : tuple of float
         TCP in robot_base at the scan configuration [m].
     approach_at_scan : tuple of float
@@ -68,6 +70,7 @@ class CellCheck:
     sha256: str
     robot: str
     base_frame: str
+    base_tilt_deg: float
     tcp_parent: str
     approach_axis: str
     tcp_at_scan_m: tuple[float, ...]
@@ -118,6 +121,7 @@ def check_loaded(loaded: LoadedCell) -> CellCheck:
         sha256=loaded.sha256,
         robot=cell.robot.urdf,
         base_frame=robot.base_frame,
+        base_tilt_deg=round(float(np.degrees(tilt_rad(robot.T_world_base[:3, :3]))), 4),
         tcp_parent=cell.robot.tcp.parent,
         approach_axis=cell.robot.tcp.approach_axis,
         tcp_at_scan_m=_rounded(T_base_tcp[:3, 3]),

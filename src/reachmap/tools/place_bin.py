@@ -14,7 +14,7 @@ from reachmap.core.collision.bin_fit import BinFit
 from reachmap.core.collision.camera import Camera
 from reachmap.core.scene import Scene
 from reachmap.errors import SettingsError
-from reachmap.geometry import yaw_transform
+from reachmap.geometry import inverse_transform
 from reachmap.maps import (
     BinPlacement,
     RunClock,
@@ -26,6 +26,7 @@ from reachmap.maps import (
 )
 from reachmap.maps.bytes.publish import check_picture
 from reachmap.maps.records import Stamp
+from reachmap.maps.summary.upright import upright_workspace
 from reachmap.placement.decision import (
     Decision,
     Outcome,
@@ -139,6 +140,12 @@ def place_bin(
         workspace_map.provenance, str(workspace), with_seed(overrides, seed)
     )
     refuse_cell_files([output, picture], loaded)
+    workspace_map = upright_workspace(workspace_map, loaded.cell.T_base_level())
+    if loaded.cell.bin_scan.orientations.reference == "robot_base":
+        raise SettingsError(
+            "bin_scan.orientations.reference is robot_base: test grasps that do not "
+            "turn with the bin cannot be placed (world and bin can)"
+        )
     region = _region(loaded, workspace_map, choice)
     scene = Scene.build(loaded, with_bin=False)
     scene.require_free_scan_configuration()
@@ -221,7 +228,7 @@ def _record(
     clock: RunClock,
 ) -> BinPlacement:
     table, names = decision.table, question.scene.robot.joint_names
-    T_base_bin = yaw_transform(*table.rows[outcome.chosen].pose)
+    T_base_bin = question.T_base_bin(table.rows[outcome.chosen].pose)
     q = np.array(outcome.scan.q)
     placed = question.loaded.with_changes(
         bin_pose=T_base_bin,
@@ -256,6 +263,8 @@ def _record(
         paper_choice=outcome.paper_choice,
         rule=rule,
         candidate_pose=table.poses(),
+        T_world_base=placed.cell.robot.base_pose.matrix(),
+        T_base_level=placed.cell.T_base_level(),
         score=table.values("score"),
         worst_point=table.values("worst_point"),
         reachable_share=table.values("reachable_share"),
@@ -302,5 +311,6 @@ def _camera_view(placement: BinPlacement, question: Question) -> FloatArray | No
     T_base_camera = (
         scene.kinematics.forward(placement.scan_configuration) @ camera.T_tcp_camera
     )
-    rim = float(placement.bin_pose[2, 3]) + cell.bin.inner[2]
-    return picture_corners(T_base_camera, cell.camera, rim)
+    T_level_camera = inverse_transform(placement.T_base_level) @ T_base_camera
+    rim = float(placement.candidate_pose[placement.chosen, 2]) + cell.bin.inner[2]
+    return picture_corners(T_level_camera, cell.camera, rim)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -10,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from reachmap.cell.loading import read_cell
+from reachmap.cell.mounting import leaning_levels
 from reachmap.core.scene import Scene
 from reachmap.errors import SettingsError
 from reachmap.maps import (
@@ -41,6 +43,8 @@ from reachmap.tools.prologue import (
 
 if TYPE_CHECKING:
     from reachmap.cell.loading import LoadedCell
+
+logger = logging.getLogger(__name__)
 
 METHODS = ("roadmap", "per-frame")
 SAMPLE_FRAMES = 200
@@ -88,6 +92,9 @@ def workspace_scan(
     check_scan_output(output, run, [path_of_cell(cell)])
     loaded = read_cell(cell, with_seed(overrides, seed))
     refuse_cell_files([output], loaded)
+    leaning = leaning_levels(loaded.cell)
+    if leaning:
+        logger.warning("%s: %s", loaded.source, leaning)
     scene = Scene.build(loaded, with_bin=with_bin)
     scene.require_free_scan_configuration()
     document = scan_document(
@@ -136,7 +143,7 @@ def _scan_by_roadmap(
 
 def _survey_context(loaded: LoadedCell, *, with_bin: bool) -> SurveyContext:
     cell = loaded.cell
-    cubes = workspace_frames(cell.workspace_scan, cell.robot.tcp.approach_axis)
+    cubes = workspace_frames(cell)
     return SurveyContext(
         loaded=loaded,
         with_bin=with_bin,
@@ -202,9 +209,7 @@ def estimate_workspace_scan(
     poses = np.concatenate(
         [
             cube.frames.transforms().reshape(-1, 4, 4)
-            for cube in workspace_frames(
-                loaded.cell.workspace_scan, loaded.cell.robot.tcp.approach_axis
-            )
+            for cube in workspace_frames(loaded.cell)
         ]
     )
     rows = np.random.default_rng(0).permutation(len(poses))[:SAMPLE_FRAMES]

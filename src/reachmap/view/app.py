@@ -13,7 +13,6 @@ from reachmap._typing import FloatArray, IntArray
 from reachmap.core.collision.solids import SolidCell
 from reachmap.core.scene import Scene
 from reachmap.errors import ReachmapError
-from reachmap.geometry import yaw_transform
 from reachmap.maps.format.registry import Artefact
 from reachmap.maps.records import BinMap, BinPlacement, WorkspaceMap
 from reachmap.maps.summary.statistics import best_level
@@ -66,8 +65,10 @@ class App:
         self._busy = threading.Lock()
         self._stop = threading.Event()
         if isinstance(record, BinPlacement) and record.runner_up >= 0:
-            x, y, z, yaw = (float(v) for v in record.candidate_pose[record.runner_up])
-            self.stage.put_ghost_bin(yaw_transform(x, y, z, yaw), name="runner_up")
+            self.stage.put_ghost_bin(
+                record.T_base_level @ record.T_level_bin(record.runner_up),
+                name="runner_up",
+            )
         self._build_panel()
         self.refresh()
 

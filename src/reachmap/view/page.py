@@ -11,7 +11,6 @@ import numpy as np
 
 from reachmap._typing import FloatArray
 from reachmap.core.collision.solids import SolidCell
-from reachmap.geometry import yaw_transform
 from reachmap.maps.format.registry import Artefact
 from reachmap.maps.records import BinMap, BinPlacement, WorkspaceMap
 from reachmap.maps.summary.statistics import best_level, level_means, saturation_of
@@ -220,8 +219,10 @@ def _placement_page(
 ) -> str:
     stage.put_points(points, np.arange(len(points.position)), points.main, scale=0.7)
     if record.runner_up >= 0:
-        x, y, z, yaw = (float(v) for v in record.candidate_pose[record.runner_up])
-        stage.put_ghost_bin(yaw_transform(x, y, z, yaw), name="runner_up")
+        stage.put_ghost_bin(
+            record.T_base_level @ record.T_level_bin(record.runner_up),
+            name="runner_up",
+        )
     stage.put_label("The bin as chosen; glass: the runner-up", name="/l")
     recording = server.get_scene_serializer()
     recording.insert_sleep(LEVEL_S)

@@ -170,7 +170,7 @@ def _workspace_points(record: WorkspaceMap) -> MapPoints:
     )
     z, level = np.unique(position[:, 2], return_inverse=True)
     return MapPoints(
-        position=position,
+        position=_in_base(position, record.T_base_grid),
         level=level.ravel(),
         levels=tuple(f"z = {name} m" for name in level_names(z)),
         shares=_shares(frames, len(position)),
@@ -211,12 +211,17 @@ def _placement_points(record: BinPlacement) -> MapPoints:
     np.fmax.at(best, place.ravel(), record.score)
     z, level = np.unique(position[:, 2], return_inverse=True)
     return MapPoints(
-        position=position,
+        position=_in_base(position, record.T_base_level),
         level=level.ravel(),
         levels=tuple(f"z = {name} m" for name in level_names(z)),
         shares={"score": best},
         size_m=0.25 * _spacing(position),
     )
+
+
+def _in_base(points: FloatArray, T_base_own: FloatArray) -> FloatArray:
+    """Points (n, 3) of a map's own frame in robot_base."""
+    return np.asarray(points @ T_base_own[:3, :3].T + T_base_own[:3, 3])
 
 
 def shortest_paths(record: BinMap) -> IntArray:

@@ -113,7 +113,7 @@ class Stage:
         own = next(iter([s for s in self.cell.solids if s.kind == "bin"]), None)
         if own is None:
             return
-        T_base_own = self.cell.loaded.cell.bin.pose.matrix()
+        T_base_own = self.cell.loaded.cell.T_base_bin()
         T_there = T_base_bin @ np.linalg.inv(T_base_own)
         poses = self.cell.solid_poses(self.cell.scan_configuration)
         for index, solid in enumerate(self.cell.solids):

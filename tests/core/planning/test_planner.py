@@ -29,9 +29,7 @@ def planner_of(scene, **spec):
 def bin_goals(scene, count):
     """Goal sets of test grasps in the scene's bin."""
     cell = scene.loaded.cell
-    grid = bin_test_frames(
-        cell.bin_scan, cell.bin, cell.robot.tcp.approach_axis, scene.T_base_bin
-    ).frames
+    grid = bin_test_frames(cell, scene.T_base_bin).frames
     rows = np.random.default_rng(1).permutation(grid.size)[: 6 * count]
     survey = survey_frames(scene, grid.transforms_at(rows), 0.0)
     sets = [survey.goals[survey.goals_of(k)] for k in range(len(rows))]

@@ -7,6 +7,7 @@ from typing import Annotated
 from pydantic import Field, model_validator
 
 from reachmap.cell.model.fields import (
+    BaseOrWorld,
     Identifier,
     Length,
     LengthRange,
@@ -54,7 +55,8 @@ class BinSpec(Record):
     bottom: Length | None = Field(
         None, description="Thickness of the bottom [m]; default: that of the walls."
     )
+    frame: BaseOrWorld = Field("robot_base", description="Frame of pose.")
     pose: PoseSpec = Field(
-        PoseSpec(), description="Centre of the inner bottom in robot_base, z up."
+        PoseSpec(), description="Centre of the inner bottom, z out of the bin."
     )
     touch: tuple[Name, ...] = Field((), description="Bodies the bin may touch.")

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from typing import Any, Literal
 
+import numpy as np
 from pydantic import Field, model_validator
 
+from reachmap._typing import FloatArray
 from reachmap.cell.model.bodies import BinSpec, BodySpec, CameraSpec
 from reachmap.cell.model.fields import (
     Angle,
+    BaseOrWorld,
     Identifier,
     Name,
     NonNegative,
@@ -24,6 +27,11 @@ from reachmap.cell.model.scans import (
     CubeSpec,
     PlacementSpec,
     WorkspaceScanSpec,
+)
+from reachmap.geometry import (
+    inverse_transform,
+    transform_from_parts,
+    upright_rotation,
 )
 
 __all__ = [
@@ -139,6 +147,31 @@ class Cell(Record):
         if repeated:
             raise ValueError(f"bodies need different names (repeated: {repeated})")
         return self
+
+    def T_base_world(self) -> FloatArray:  # noqa: N802
+        """The world in robot_base, shape (4, 4)."""
+        return inverse_transform(self.robot.base_pose.matrix())
+
+    def T_base_bin(self) -> FloatArray:  # noqa: N802
+        """The bin in robot_base, shape (4, 4)."""
+        return self._in_base(self.bin.frame) @ self.bin.pose.matrix()
+
+    def T_base_grid(self) -> FloatArray:  # noqa: N802
+        """The frame of the workspace scan's lattice in robot_base, shape (4, 4)."""
+        return self._in_base(self.workspace_scan.frame)
+
+    def T_base_level(self) -> FloatArray:  # noqa: N802
+        """The frame that heights and yaws are counted in, in robot_base, (4, 4).
+
+        That of the workspace scan, stood upright about its origin where it leans.
+        """
+        T_base_grid = self.T_base_grid()
+        R_world_grid = self.robot.base_pose.matrix()[:3, :3] @ T_base_grid[:3, :3]
+        upright = transform_from_parts(upright_rotation(R_world_grid), np.zeros(3))
+        return np.asarray(T_base_grid @ upright)
+
+    def _in_base(self, frame: BaseOrWorld) -> FloatArray:
+        return self.T_base_world() if frame == "world" else np.eye(4)
 
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"

@@ -10,8 +10,11 @@ from pydantic import Discriminator, Field, Tag, model_validator
 from reachmap.cell.model.fields import Angle, Angles3, Record
 
 MAX_RINGS = 32
-Tilt = Annotated[float, Field(ge=0, lt=180, allow_inf_nan=False)]
+Tilt = Annotated[float, Field(ge=0, le=180, allow_inf_nan=False)]
 Rolls = Annotated[int, Field(ge=1, le=360)]
+
+
+Reference = Literal["world", "robot_base", "bin"]
 
 
 def _ring_kind(value: Any) -> str:
@@ -48,6 +51,11 @@ class ConeFamily(Record):
     """
 
     family: Literal["cone"] = Field("cone", description="Cones about straight down.")
+    reference: Reference = Field(
+        "world",
+        description="Whose vertical counts. world: azimuths are counted from the "
+        "horizontal direction of robot_base's x (workspace scan) or the bin's.",
+    )
     tilts_deg: tuple[Tilt, ...] = Field(
         (0.0, 30.0),
         min_length=1,
@@ -88,10 +96,10 @@ class ConeFamily(Record):
                     f"(got {rings} and {len(value)})"
                 )
         for tilt, count in zip(self.tilts_deg, self.azimuths, strict=True):
-            if tilt == 0 and count > 1:
+            if tilt in (0, 180) and count > 1:
                 raise ValueError(
-                    f"a ring with tilt 0 has one direction, straight down (got {count} "
-                    "azimuths)"
+                    f"a ring with tilt {tilt:g} has one direction, straight "
+                    f"{'up' if tilt else 'down'} (got {count} azimuths)"
                 )
         return self
 
@@ -115,6 +123,11 @@ class ListFamily(Record):
     """Orientations of the TCP, one by one, as roll, pitch, yaw in degrees."""
 
     family: Literal["list"] = Field(description="Orientations one by one.")
+    reference: Reference | None = Field(
+        None,
+        description="Frame they are given in; null: robot_base in the workspace scan, "
+        "bin in the bin scan.",
+    )
     rpy_deg: tuple[Angles3, ...] = Field(
         min_length=1,
         max_length=1000,

@@ -8,6 +8,7 @@ from pydantic import Field, model_validator
 
 from reachmap.cell.model.fields import (
     AngleRange,
+    BaseOrWorld,
     Coordinate,
     Length,
     LengthRange,
@@ -25,8 +26,8 @@ class CubeSpec(Record):
     name: str = Field(
         pattern=r"^[A-Za-z_]\w*$", max_length=40, description="Name of its map."
     )
-    min: Vector3 = Field(description="Lowest corner, robot_base [m].")
-    max: Vector3 = Field(description="Highest corner, robot_base [m].")
+    min: Vector3 = Field(description="Lowest corner, frame of the scan [m].")
+    max: Vector3 = Field(description="Highest corner, frame of the scan [m].")
     grid: tuple[Count, Count] = Field(description="Points along x and along y.")
 
     @model_validator(mode="after")
@@ -50,6 +51,10 @@ def _check_frame_count(count: int) -> None:
 class WorkspaceScanSpec(Record):
     """The workspace scan: cubes, levels, orientations, repeats."""
 
+    frame: BaseOrWorld = Field(
+        "robot_base",
+        description="Frame of the cubes; levels are its planes of equal z.",
+    )
     cubes: tuple[CubeSpec, ...] = Field(
         min_length=1, max_length=16, description="Lattices that make up the map."
     )
@@ -117,17 +122,18 @@ class BinScanSpec(Record):
 
 
 class PlacementSpec(Record):
-    """Where the bin may stand."""
+    """Where the bin may stand, in the frame of the workspace scan, stood upright."""
 
     x: LengthRange | None = Field(
-        None, description="Range of the bin's centre along robot_base x [m]."
+        None, description="Range of the bin's centre along x [m]."
     )
     y: LengthRange | None = Field(
-        None, description="Range of the bin's centre along robot_base y [m]."
+        None, description="Range of the bin's centre along y [m]."
     )
     z: LengthRange | None = Field(
-        None, description="Range of the bin's inner bottom along robot_base z [m]."
+        None, description="Range of the height of the bin's inner bottom [m]."
     )
     yaw_deg: AngleRange = Field(
-        (0.0, 180.0), description="Range of the bin's rotation about z [deg]."
+        (0.0, 180.0),
+        description="Range of the bin's rotation about the vertical [deg].",
     )

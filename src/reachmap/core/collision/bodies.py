@@ -20,7 +20,7 @@ from reachmap.cell.files.files import body_key
 from reachmap.cell.files.srdf import parse_srdf
 from reachmap.cell.files.urdf import UrdfDescription
 from reachmap.cell.meshes.reading import MeshError, read_mesh
-from reachmap.cell.model.cell import BinSpec
+from reachmap.cell.model.cell import BinSpec, Cell
 from reachmap.cell.model.fields import Shape
 from reachmap.cell.model.shapes import Solid
 from reachmap.core.collision.shapes import coal_shape
@@ -94,14 +94,14 @@ def bin_boxes(spec: BinSpec) -> tuple[BinBox, ...]:
     return tuple(BinBox(name=n, size_m=s, centre_m=c) for n, s, c in (floor, *walls))
 
 
-def bin_placements(robot: RobotModel, spec: BinSpec) -> dict[str, FloatArray]:
+def bin_placements(robot: RobotModel, cell: Cell) -> dict[str, FloatArray]:
     """Poses (4, 4) of the bin's boxes in the model's root frame, by name."""
-    T_root_bin = robot.T_root_base @ spec.pose.matrix()
+    T_root_bin = robot.T_root_base @ cell.T_base_bin()
     return {
         box.name: np.asarray(
             T_root_bin @ transform_from_parts(np.eye(3), np.array(box.centre_m))
         )
-        for box in bin_boxes(spec)
+        for box in bin_boxes(cell.bin)
     }
 
 
@@ -129,7 +129,7 @@ def build_geometry(
         shape = _body_shape(loaded, body.name, body.shape)
         builder.add(body.name, joint, T_joint_frame @ body.pose.matrix(), shape)
     if with_bin:
-        placements = bin_placements(robot, loaded.cell.bin)
+        placements = bin_placements(robot, loaded.cell)
         for box in bin_boxes(loaded.cell.bin):
             shape = Shape(box=box.size_m)
             builder.add(box.name, ROOT, placements[box.name], shape)

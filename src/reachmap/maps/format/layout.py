@@ -7,6 +7,9 @@ from collections.abc import Callable, Container, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
+import numpy as np
+
+from reachmap._typing import FloatArray
 from reachmap.maps.bytes.tree import Tree
 from reachmap.maps.records import Status
 
@@ -169,6 +172,32 @@ class Layout:
     attributes: dict[str, str]
     check: Callable[[Tree], list[str]]
     sections: tuple[Section, ...] = ()
+
+    def in_frame(
+        self, field: str, T: FloatArray, names: Container[str], frame: str
+    ) -> Layout:
+        """The layout of a file some of whose numbers are in a frame of their own.
+
+        Parameters
+        ----------
+        field : str
+            Name of the section that holds the frame; where that is robot_base itself
+            the file goes without.
+        T : array, shape (4, 4)
+            The frame in robot_base.
+        names : container of str
+            Variables whose numbers are in it.
+        frame : str
+            What they call it.
+        """
+        if np.array_equal(T, np.eye(4)):
+            kept = tuple(part for part in self.sections if part.field != field)
+            return dataclasses.replace(self, sections=kept)
+        variables = tuple(
+            dataclasses.replace(item, frame=frame) if item.name in names else item
+            for item in self.variables
+        )
+        return dataclasses.replace(self, variables=variables)
 
     @property
     def format(self) -> str:

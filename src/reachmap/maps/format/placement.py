@@ -108,7 +108,7 @@ PLACEMENT = Layout(
             "candidate_yaw",
             "f8",
             "rad",
-            "Angle of the bin about z.",
+            "Angle of the bin about the vertical.",
             frame="robot_base",
         ),
         _per_candidate(
@@ -206,19 +206,20 @@ def tree_from_placement(record: BinPlacement) -> Tree:
     reasons = ("", *sorted(set(record.reason) - {""}))
     shift = {k: v for k, v in record.margin.items() if not is_turn(k)}
     turn = {k: v for k, v in record.margin.items() if is_turn(k)}
-    poses = np.reshape(record.candidate_pose, (-1, 4))
+    poses, T = np.reshape(record.candidate_pose, (-1, 4)), record.T_base_level
     arrays: dict[str, Any] = {name: getattr(record, name) for name in _ARRAYS}
     arrays.update(
-        candidate_position=poses[:, :3],
+        candidate_position=poses[:, :3] @ T[:3, :3].T + T[:3, 3],
         candidate_yaw=poses[:, 3],
         reason=np.array([reasons.index(text) for text in record.reason], np.int64),
         shift_margin=np.array(list(shift.values()), float),
         turn_margin=np.array(list(turn.values()), float),
     )
-    optional, lists, numbers = section_arrays(PLACEMENT, record)
+    layout = PLACEMENT.in_frame("T_base_level", T, ("candidate_yaw",), "level")
+    optional, lists, numbers = section_arrays(layout, record)
     texts = {} if record.support is None else {"support": record.support}
     return assemble(
-        PLACEMENT,
+        layout,
         arrays={**arrays, **optional},
         attributes={
             **{name: int(getattr(record, name)) for name in _ROWS},
@@ -265,11 +266,12 @@ def placement_from_tree(tree: Tree, path: Path) -> BinPlacement:
     optional = sections_of(PLACEMENT, tree)
     if "tolerance" in optional:
         optional["tolerance"] = tuple(optional["tolerance"].tolist())
-    position, yaw = tree.array("candidate_position"), tree.array("candidate_yaw")
+    T = optional.setdefault("T_base_level", np.eye(4))
+    position = (tree.array("candidate_position") - T[:3, 3]) @ T[:3, :3]
     return BinPlacement(
         **stored,
         rule=str(tree.attributes["rule"]),
-        candidate_pose=np.column_stack([position, yaw]),
+        candidate_pose=np.column_stack([position, tree.array("candidate_yaw")]),
         reason=tuple(str(reasons[code]) for code in tree.array("reason")),
         margin={**_margin(tree, "shift"), **_margin(tree, "turn")},
         joint_names=tuple(tree.attributes["joint_names"]),

@@ -43,22 +43,28 @@ def _component(name: str, dtype: str, meaning: str, **more: Any) -> Variable:
     )
 
 
-def world(*, with_scales: bool = False) -> Section:
-    """Where the robot stands; scales where the rest of the file has no pose."""
+def _pose(name: str, meaning: str, frame: str, *, with_scales: bool = False) -> Section:
+    """One pose; with scales where the rest of the file has no pose."""
     return Section(
-        field="T_world_base",
+        field=name,
         scales=_POSE_SCALES if with_scales else (),
         arrays={
-            "T_world_base": _variable(
-                "T_world_base",
+            name: _variable(
+                name,
                 ("pose_row", "pose_column"),
                 "f8",
-                "Pose of robot_base in the world; the rotation block has no unit.",
+                f"{meaning}; the rotation block has no unit.",
                 units="m",
-                frame="world",
+                frame=frame,
             )
         },
     )
+
+
+def world(*, with_scales: bool = False) -> Section:
+    """Where the robot stands."""
+    meaning = "Pose of robot_base in the world"
+    return _pose("T_world_base", meaning, "world", with_scales=with_scales)
 
 
 COMPONENTS = Section(
@@ -325,7 +331,11 @@ BIN_SECTIONS = (
     COMPONENT, COMPONENTS, ROLLS, WINNING_ROLL, EFFORT, BEST, TIMES, MARGINS, CYCLE,
     STAGE_OF_PATH, world(),
 )  # fmt: skip
-WORKSPACE_SECTIONS = (COMPONENTS, world(with_scales=True))
+WORKSPACE_SECTIONS = (
+    COMPONENTS,
+    world(with_scales=True),
+    _pose("T_base_grid", "Frame of x, y, z in robot_base", "robot_base"),
+)
 
 PLACEMENT_SECTIONS = (
     Section(
@@ -363,4 +373,9 @@ PLACEMENT_SECTIONS = (
         )
     ),
     world(),
+    _pose(
+        "T_base_level",
+        "Upright frame that yaws and heights are counted in, in robot_base",
+        "robot_base",
+    ),
 )

@@ -122,6 +122,7 @@ def cubes_from_tree(tree: Tree) -> dict[str, CubeMap]:
 
 
 _LEVEL = ("z", "y", "x")
+_AXES = (*_LEVEL, "cube_z", "cube_y", "cube_x")
 _FRAME = ("cube_z", "cube_y", "cube_x", "orientation")
 _CUBE = "cubes/{cube}/"
 
@@ -274,9 +275,10 @@ def tree_from_workspace_map(record: WorkspaceMap) -> Tree:
             arrays[f"cubes/{cube}/{name}"] = getattr(content, name)
         for axis in "zyx":
             arrays[f"cubes/{cube}/cube_{axis}"] = getattr(content, axis)
-    optional, lists, numbers = section_arrays(WORKSPACE, record)
+    layout = WORKSPACE.in_frame("T_base_grid", record.T_base_grid, _AXES, "grid")
+    optional, lists, numbers = section_arrays(layout, record)
     return assemble(
-        WORKSPACE,
+        layout,
         arrays={**arrays, **optional},
         attributes={"method": record.method},
         labels={

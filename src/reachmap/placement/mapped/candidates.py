@@ -17,7 +17,7 @@ class Candidate:
     Attributes
     ----------
     pose : tuple of float
-        x, y, z [m], yaw [rad] of the bin in robot_base.
+        x, y, z [m], yaw [rad] of the bin in the cell's level frame.
     score : PoseScore or None
         None exactly where there is a reason.
     exact : bool

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from reachmap._typing import FloatArray, IntArray
+from reachmap.cell.model.cell import Cell
 from reachmap.cell.model.roadmap import RoadmapSpec
 from reachmap.core.planning.approach import StraightApproach
 from reachmap.core.planning.connection import Connection, connect
@@ -53,6 +54,18 @@ class PoseScore:
     path_length_rad: float
 
 
+def bin_at(cell: Cell, pose: Pose) -> FloatArray:
+    """T_base_bin of a bin that stands upright at a pose, shape (4, 4).
+
+    Parameters
+    ----------
+    cell : Cell
+    pose : (x, y, z [m], yaw [rad])
+        In the cell's level frame, see :meth:`Cell.T_base_level`.
+    """
+    return np.asarray(cell.T_base_level() @ yaw_transform(*pose))
+
+
 class PlacedScene:
     """A cell with its bin at one pose, and what its test frames offer.
 
@@ -77,7 +90,7 @@ class PlacedScene:
     """
 
     def __init__(self, scene: Scene, pose: Pose, sample: Sample) -> None:
-        changed = scene.loaded.with_changes(bin_pose=yaw_transform(*pose))
+        changed = scene.loaded.with_changes(bin_pose=bin_at(scene.loaded.cell, pose))
         self.pose = pose
         self.scene = scene.with_bin_of(changed)
         cell = changed.cell

@@ -75,8 +75,13 @@ def frames_in_bin(cell: Cell) -> FrameGrid:
 
     Of many layers the lowest, the middle and the highest are kept.
     """
-    axis = cell.robot.tcp.approach_axis
-    frames = bin_test_frames(cell.bin_scan, cell.bin, axis, np.eye(4)).frames
+    T_base_bin = cell.T_base_level()
+    R_base_bin, p_base_bin = T_base_bin[:3, :3], T_base_bin[:3, 3]
+    in_base = bin_test_frames(cell, T_base_bin).frames
+    frames = FrameGrid(
+        points=(in_base.points - p_base_bin) @ R_base_bin,
+        orientations=R_base_bin.T @ in_base.orientations,
+    )
     count = len(frames.points)
     if count <= MAX_LAYERS:
         return frames

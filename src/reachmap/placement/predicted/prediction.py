@@ -173,9 +173,9 @@ class ReachField:
     Attributes
     ----------
     x, y, z : array, shape (nx,), (ny,), (nz,)
-        robot_base [m].
+        Level frame of the cell [m].
     R : array, shape (no, 3, 3)
-        R_base_tcp of each orientation.
+        R_level_tcp of each orientation.
     path, ik : array, shape (no, nz, ny, nx)
         Share of frames with a path, and with an IK solution, from 0 to 1; 0 where
         nothing was attempted.
@@ -191,6 +191,11 @@ class ReachField:
 
 def field_of(workspace: WorkspaceMap) -> ReachField:
     """Pool the frames of all cubes, orientation by orientation.
+
+    Parameters
+    ----------
+    workspace : WorkspaceMap
+        With its lattice in the cell's level frame.
 
     Raises
     ------
@@ -219,7 +224,7 @@ def field_of(workspace: WorkspaceMap) -> ReachField:
         x=lattice.x,
         y=lattice.y,
         z=lattice.z,
-        R=rotation_from_quaternion_wxyz(quaternion),
+        R=workspace.T_base_grid[:3, :3].T @ rotation_from_quaternion_wxyz(quaternion),
         path=np.array(shares["path"]),
         ik=np.array(shares["ik"]),
     )

@@ -19,6 +19,8 @@ SLACK = 1e-9
 class Region:
     """Ranges of the bin's pose: x, y, z of the inner bottom [m], yaw [rad].
 
+    They are in the cell's level frame, see :meth:`Cell.T_base_level`.
+
     Attributes
     ----------
     low, high : array, shape (4,)

@@ -9,7 +9,10 @@ from pydantic import ValidationError
 
 from reachmap._typing import FloatArray
 from reachmap.cell.model.cell import Cell
-from reachmap.maps.records import Provenance
+from reachmap.errors import SettingsError
+from reachmap.geometry import inverse_transform
+from reachmap.maps.records import Provenance, WorkspaceMap
+from reachmap.maps.summary.upright import upright_workspace
 from reachmap.plots.parts.outlines import (
     Outline,
     base_outline,
@@ -53,8 +56,24 @@ def context_of(provenance: Provenance) -> CellContext:
         cell=cell,
         name=cell.name,
         standing=(base_outline(cell, provenance.urdf), *body_outlines(cell)),
-        bin=bin_outlines(cell.bin, cell.bin.pose.matrix()),
+        bin=bin_outlines(
+            cell.bin, inverse_transform(cell.T_base_level()) @ cell.T_base_bin()
+        ),
     )
+
+
+def levels_of(workspace: WorkspaceMap) -> WorkspaceMap:
+    """A map as pictures show it: its levels rise, its outlines are seen from above.
+
+    A lattice that leans is shown as it is.
+    """
+    cell = context_of(workspace.provenance).cell
+    if cell is None:
+        return workspace
+    try:
+        return upright_workspace(workspace, cell.T_base_level())
+    except SettingsError:
+        return workspace
 
 
 def patch_shape(

@@ -1,4 +1,7 @@
-"""What stands in the cell, as outlines seen from above, to scale, in robot_base."""
+"""What stands in the cell, as outlines seen from above, to scale.
+
+They are in the level frame of the cell, which is robot_base where that is upright.
+"""
 
 from __future__ import annotations
 
@@ -59,7 +62,7 @@ class Outline:
     kind : str
         How it is drawn, a key of :data:`LOOKS`.
     polygon : array, shape (n, 2)
-        Corners in robot_base [m], not closed.
+        Corners in the level frame [m], not closed.
     z_low, z_high : float
         Heights that the thing spans [m].
     """
@@ -76,7 +79,7 @@ class Outline:
 
 
 def hull_outline(name: str, kind: Kind, points: FloatArray) -> Outline:
-    """Outline of the convex hull of points in robot_base, shape (n, 3) [m]."""
+    """Outline of the convex hull of points, shape (n, 3) [m]."""
     xy = points[:, :2]
     try:
         xy = xy[ConvexHull(xy).vertices]
@@ -88,8 +91,8 @@ def hull_outline(name: str, kind: Kind, points: FloatArray) -> Outline:
 
 def body_outlines(cell: Cell) -> tuple[Outline, ...]:
     """Outlines of the bodies that stand still (attached to world or robot_base)."""
-    T_base_world = inverse_transform(cell.robot.base_pose.matrix())
-    frames = {"world": T_base_world, "robot_base": np.eye(4)}
+    T_level_base = inverse_transform(cell.T_base_level())
+    frames = {"world": T_level_base @ cell.T_base_world(), "robot_base": T_level_base}
     found = []
     for body in cell.bodies:
         # The file of a mesh may not be on this machine.
@@ -102,7 +105,7 @@ def body_outlines(cell: Cell) -> tuple[Outline, ...]:
 
 
 def bin_outlines(
-    spec: BinSpec, T_base_bin: FloatArray, *, name: str = "bin", kind: Kind = "bin"
+    spec: BinSpec, T_level_bin: FloatArray, *, name: str = "bin", kind: Kind = "bin"
 ) -> tuple[Outline, ...]:
     """Inner and outer rectangle of a bin in a pose; only the outer has the name.
 
@@ -114,7 +117,7 @@ def bin_outlines(
     for label, margin in ((name, spec.wall), ("", 0.0)):
         sides = np.array([x + 2 * margin, y + 2 * margin, depth + bottom])
         points = box_corners(sides) + np.array([0.0, 0.0, (depth - bottom) / 2.0])
-        outlines.append(hull_outline(label, kind, _moved(T_base_bin, points)))
+        outlines.append(hull_outline(label, kind, _moved(T_level_bin, points)))
     return tuple(outlines)
 
 
@@ -166,7 +169,7 @@ STAR_SECTORS = 120
 
 
 def base_outline(cell: Cell, urdf: str) -> Outline:
-    """Outline of the links fixed to the base, in robot_base, from above.
+    """Outline of the links fixed to the base, from above.
 
     Parameters
     ----------
@@ -182,21 +185,23 @@ def base_outline(cell: Cell, urdf: str) -> Outline:
         meshes are not on this machine: a picture is not worth failing for that.
     """
     points = _base_points(cell, urdf)
+    T_level_base = inverse_transform(cell.T_base_level())
     if points is not None:
-        return _star_outline(points)
+        return _star_outline(_moved(T_level_base, points), T_level_base[:2, 3])
     spec = Shape(cylinder=CylinderShape(radius=NOMINAL_RADIUS, length=0.001))
     circle = triangles_of(spec).vertices
-    return hull_outline(f"{NAME} (origin)", "base", circle)
+    return hull_outline(f"{NAME} (origin)", "base", _moved(T_level_base, circle))
 
 
-def _star_outline(points: FloatArray) -> Outline:
-    """Outline of points as the farthest in each direction from the origin.
+def _star_outline(points: FloatArray, centre: FloatArray) -> Outline:
+    """Outline of points as the farthest in each direction from a centre (2,).
 
     A convex hull would close the gap between a round base and its connector.
     """
-    angle = np.arctan2(points[:, 1], points[:, 0])
+    x, y = (points[:, :2] - centre).T
+    angle = np.arctan2(y, x)
     sector = np.floor((angle + np.pi) / (2.0 * np.pi) * STAR_SECTORS).astype(int)
-    radius = np.linalg.norm(points[:, :2], axis=1)
+    radius = np.hypot(x, y)
     farthest = [
         members[int(radius[members].argmax())]
         for index in range(STAR_SECTORS)

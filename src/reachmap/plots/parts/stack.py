@@ -9,7 +9,7 @@ from matplotlib.colors import Colormap
 
 from reachmap._typing import FloatArray
 from reachmap.maps.records import WorkspaceMap
-from reachmap.plots.parts.context import context_of, patch_shape
+from reachmap.plots.parts.context import context_of, levels_of, patch_shape
 from reachmap.plots.parts.levels import (
     QUANTITY_NAMES,
     Quantity,
@@ -96,6 +96,7 @@ class LevelStack:
 
 def stack_of(workspace: WorkspaceMap, quantity: Quantity) -> LevelStack:
     """Levels of a quantity, with the outlines of the cell the map was made for."""
+    workspace = levels_of(workspace)
     context = context_of(workspace.provenance)
     return LevelStack(
         x=workspace.x,

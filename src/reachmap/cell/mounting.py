@@ -1,0 +1,81 @@
+"""How the arm and the bin stand in the world, read from the cell and its URDF."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from reachmap.cell.files.urdf import UrdfDescription
+from reachmap.cell.model.cell import Cell
+from reachmap.cell.text.data import at
+from reachmap.cell.text.yaml_reader import Document
+from reachmap.geometry import (
+    UPRIGHT_RAD,
+    inverse_transform,
+    quaternion_wxyz_from_rotation,
+    tilt_rad,
+)
+
+# Parts slide out of a bin long before; it is a bin that was meant to stand.
+MAX_BIN_TILT_DEG = 75.0
+
+
+def write_out_base_pose(
+    document: Document, data: dict[str, Any], robot: UrdfDescription
+) -> None:
+    """Let the URDF say how the arm hangs, where the cell does not.
+
+    Without ``robot.base_pose`` the world is robot_base. Where fixed joints turn
+    robot_base away from the upright, the URDF's root link is the world instead.
+
+    Parameters
+    ----------
+    document : Document
+        The cell as read.
+    data : dict
+        The cell after defaults; ``robot.base_pose`` is changed.
+    robot : UrdfDescription
+    """
+    frame = data["robot"]["base_frame"]
+    if frame is None or at(document.data, "robot", "base_pose") is not None:
+        return
+    link = frame if frame in robot.links else robot.joints[frame].child
+    T_root_base = robot.fixed_to(robot.root).get(link, np.eye(4))
+    if tilt_rad(T_root_base[:3, :3]) < UPRIGHT_RAD:
+        return
+    data["robot"]["base_pose"] = {
+        "xyz": T_root_base[:3, 3].tolist(),
+        "quaternion_wxyz": quaternion_wxyz_from_rotation(T_root_base[:3, :3]).tolist(),
+    }
+
+
+def check_bin_stands(document: Document, cell: Cell) -> None:
+    """Add a mistake where the bin stands on its side or its head in the world."""
+    T_world_bin = inverse_transform(cell.T_base_world()) @ cell.T_base_bin()
+    tilt = float(np.degrees(tilt_rad(T_world_bin[:3, :3])))
+    if tilt <= MAX_BIN_TILT_DEG:
+        return
+    hint = (
+        "robot_base itself leans, so give the pose in the world with bin.frame: world"
+        if cell.bin.frame == "robot_base"
+        else "its z axis must point up"
+    )
+    document.add(
+        ("bin", "pose"),
+        f"the bin stands {tilt:.0f} deg off the upright in the world and would spill "
+        f"(allowed: {MAX_BIN_TILT_DEG:g}); {hint}",
+    )
+
+
+def leaning_levels(cell: Cell) -> str:
+    """Say that the levels of the workspace scan are not level, "" where they are."""
+    R_world_grid = cell.robot.base_pose.matrix()[:3, :3] @ cell.T_base_grid()[:3, :3]
+    tilt = tilt_rad(R_world_grid)
+    lean = float(np.degrees(min(tilt, np.pi - tilt)))
+    if lean < np.degrees(UPRIGHT_RAD):
+        return ""
+    return (
+        f"workspace_scan.cubes: the levels lean by {lean:.3g} deg, as robot_base does; "
+        "workspace_scan.frame: world makes them horizontal"
+    )
