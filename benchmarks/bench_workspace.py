@@ -32,7 +32,6 @@ def scan(overrides: Sequence[str], workers: int) -> tuple[int, int, dict[str, fl
     """Frames, reachable frames, and seconds per phase of one scan."""
     loaded = read_cell(CELL, overrides)
     scene = Scene.build(loaded, with_bin=False)
-    spec = loaded.cell.workspace_scan
     cubes = workspace_frames(loaded.cell)
     context = SurveyContext(
         loaded=loaded,

@@ -124,8 +124,7 @@ def test_a_real_arm_swings_round_its_back():
     """Every test grasp behind the wall is reached, by paths within the limits."""
     scene = Scene.build(read_cell(str(HARD / "winding-ur10.yaml")))
     cell = scene.loaded.cell
-    axis = cell.robot.tcp.approach_axis
-    grid = bin_test_frames(cell.bin_scan, cell.bin, axis, scene.T_base_bin).frames
+    grid = bin_test_frames(cell, scene.T_base_bin).frames
     T = grid.transforms_at(np.arange(grid.size))
     survey = survey_frames(scene, T, cell.bin_scan.approach_distance_m)
     with_goals = np.flatnonzero(survey.status == Status.NOT_ATTEMPTED)
