@@ -12,18 +12,17 @@ from reachmap.maps.bytes.to_json import flat_json
 from reachmap.maps.format.placement import is_turn
 from reachmap.maps.records import Status
 from reachmap.maps.summary.bin import MEASURES, BinSummary, Spread
+from reachmap.maps.summary.directions import ReachedShares
+from reachmap.maps.summary.evidence import EvidenceSummary
 from reachmap.maps.summary.placement import CandidateSummary, PlacementSummary
+from reachmap.maps.summary.reliability import Reliability
 from reachmap.maps.summary.statistics import (
     STATUS_NAMES,
     Causes,
     Saturation,
     ik_approximation,
 )
-from reachmap.maps.summary.workspace import (
-    EvidenceSummary,
-    LevelSummary,
-    WorkspaceSummary,
-)
+from reachmap.maps.summary.workspace import LevelSummary, WorkspaceSummary
 from reachmap.plots.parts.levels import level_names
 from reachmap.text import count_text, percent_text, plural
 from reachmap.tools.info import ArtefactInfo
@@ -114,6 +113,19 @@ def _evidence_text(evidence: EvidenceSummary) -> str:
         f"{plural(evidence.frames, 'frame')}"
         f"{where if evidence.components else ''}, "
         f"{plural(evidence.attempts, 'attempt')}"
+        f"{_checks_text(evidence)}"
+    )
+
+
+def _checks_text(evidence: EvidenceSummary) -> str:
+    """State checks by method, and how often an independent method was of one mind."""
+    if evidence.checks is None:
+        return ""
+    methods = ", ".join(f"{n} {count:,}" for n, count in evidence.method_checks.items())
+    text = f", {evidence.checks:,} state checks" + (f" ({methods})" if methods else "")
+    return (
+        f"{text}; an independent method agrees on {evidence.agreed} of "
+        f"{plural(evidence.frames, 'frame')}"
     )
 
 
@@ -146,19 +158,57 @@ def _bin_lines(summary: BinSummary) -> list[str]:
         f"{plural(summary.repeats, 'attempt')} each, "
         f"{plural(summary.layers, 'layer')}, {plural(summary.paths, 'stored path')}",
         "",
+        "Path reachability",
+        *share_lines(summary.shares),
+        "",
         "Reached after n attempts (Wilson interval)",
         *table_lines(rows, ">>>>>"),
         *_beyond_lines(summary),
         "",
         "Test grasps",
         *_cause_lines(summary.causes),
+        *_unreached_lines(summary.unreached),
         "",
         "Attempts that found a path",
         *_measure_lines(summary.measures),
         "",
+        "What J is made of: share of the variance that is the grasp and not luck",
+        *reliability_lines(summary.reliability),
+        "",
         "Quadrants of the bin (N is +y, E is +x)",
         *_quadrant_lines(summary),
     ]
+
+
+def share_lines(shares: ReachedShares) -> list[str]:
+    """Reachability of frames, of directions and of points, with what each means."""
+    rows = (
+        ("frames", shares.frames, "test grasps with a path, as in the paper"),
+        ("directions", shares.directions, "with a path for at least one roll"),
+        ("points", shares.points, "with at least one such direction"),
+    )
+    return table_lines(
+        [[name, f"{percent_text(share)} %", said] for name, share, said in rows], "<><"
+    )
+
+
+def _unreached_lines(evidence: EvidenceSummary | None) -> list[str]:
+    if evidence is None or not evidence.frames:
+        return []
+    return ["", "Evidence", *fact_lines([("no path", _evidence_text(evidence))])]
+
+
+def reliability_lines(reliability: Mapping[str, Reliability]) -> list[str]:
+    """Share of each measure, with a warning where most of it is luck."""
+    rows = []
+    for name, found in reliability.items():
+        if found.share != found.share:
+            said = "not known: no test grasp was reached twice, or all are alike"
+        else:
+            noise = "; mostly luck: it says little of a grasp" if found.is_noise else ""
+            said = f"{found.share:.2f} over {plural(found.repeated, 'grasp')}{noise}"
+        rows.append((MEASURES[name].words, said))
+    return fact_lines(rows)
 
 
 def _beyond_lines(summary: BinSummary) -> list[str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from reachmap.cli.text.info import reliability_lines
 from reachmap.cli.text.tables import fact_lines, table_lines
 from reachmap.text import plural, printable
 from reachmap.validation.statistics import Confusion, Share
@@ -29,6 +30,9 @@ def validation_text(validation: Validation) -> str:
             "",
             "Predictions (Wilson 95 % intervals)",
             *_share_lines(overall),
+            "",
+            "What J is made of: share of the variance of an attempt that is the grasp",
+            *reliability_lines(validation.reliability),
             "",
             "By list",
             *_list_lines(validation.summaries),

@@ -242,8 +242,9 @@ def _quadrant_table(summary: BinSummary) -> Table:
 
 def _measure_table(summary: BinSummary) -> Table:
     rows = []
-    for name, shown in MEASURES.items():
-        spread = shown.of(summary.measures[name])
+    for name, measure in summary.measures.items():
+        shown = MEASURES[name]
+        spread = shown.of(measure)
         if spread.count:
             values = (spread.mean, spread.std, spread.low, spread.median, spread.high)
             numbers = (number(value, 3) for value in values)

@@ -39,6 +39,10 @@ def facts_of(
         **validation.settings,
         "lists": [_list_facts(one) for one in validation.summaries],
         "groups": [_group_facts(one) for one in validation.groups],
+        "reliability": {
+            name: dataclasses.asdict(found)
+            for name, found in validation.reliability.items()
+        },
     }
     if body_pairs is not None:
         facts["grasps"] = [

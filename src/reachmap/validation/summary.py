@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from reachmap._typing import FloatArray, IntArray
+from reachmap.maps.summary.reliability import Reliability, reliability_of
 from reachmap.scans.measured import MEASURED
 from reachmap.validation.judgement import ORDERS, JudgedList
 from reachmap.validation.statistics import (
@@ -113,6 +114,9 @@ class Validation:
     summaries : tuple of ListSummary
         Of each list; with several, the last is of all together.
     groups : tuple of GroupSummary
+    reliability : mapping of str to Reliability
+        Of a single attempt's path length, state checks, CPU and execution time: what
+        share of the variance is the grasp and not luck.
     """
 
     settings: Mapping[str, Any]
@@ -120,6 +124,7 @@ class Validation:
     lists: tuple[JudgedList, ...]
     summaries: tuple[ListSummary, ...]
     groups: tuple[GroupSummary, ...]
+    reliability: Mapping[str, Reliability]
 
     @property
     def overall(self) -> ListSummary:
@@ -145,7 +150,26 @@ def summarise(
         lists=tuple(lists),
         summaries=tuple(summaries),
         groups=tuple(groups),
+        reliability=_reliability(lists),
     )
+
+
+def _reliability(lists: Sequence[JudgedList]) -> dict[str, Reliability]:
+    """Of the attempts at all grasps, whatever the lists."""
+    if len({one.results.found.shape[1] for one in lists}) != 1:
+        return {}
+    measured = np.concatenate([one.results.measured for one in lists])
+    checks = np.concatenate([one.results.checks for one in lists]).astype(float)
+    path = measured[..., MEASURED.index("path_length")]
+    values = {
+        "path_length": path,
+        "effort_checks": np.where(np.isnan(path), np.nan, checks),
+        **{
+            name: measured[..., MEASURED.index(name)]
+            for name in ("planning_cpu_time", "execution_time")
+        },
+    }
+    return {name: reliability_of(attempts) for name, attempts in values.items()}
 
 
 def summarise_lists(label: str, lists: Sequence[JudgedList]) -> ListSummary:

@@ -8,6 +8,9 @@ import numpy as np
 
 from reachmap._typing import BoolArray, FloatArray
 from reachmap.maps.records import BinMap, Status
+from reachmap.maps.summary.directions import ReachedShares, reached_shares
+from reachmap.maps.summary.evidence import EvidenceSummary, evidence_of
+from reachmap.maps.summary.reliability import Reliability, term_reliability
 from reachmap.maps.summary.statistics import (
     Causes,
     Saturation,
@@ -52,9 +55,19 @@ MEASURES: dict[str, Shown] = {
     "planning_time": Shown("planning time (wall)", "ms", 1e3),
     "simplification_time": Shown("simplification time", "ms", 1e3),
     "execution_time": Shown("execution time", "s"),
+    "effort_checks": Shown("state checks", "1"),
+    "approach_time": Shown("straight approach in it", "s"),
+    "retreat_time": Shown("straight retreat after it", "s"),
+    "clearance": Shown("clearance", "mm", 1e3),
+    "joint_margin": Shown("distance to joint limits", "deg", 180.0 / np.pi),
+    "smallest_singular_value": Shown("smallest singular value", "1"),
 }
-"""Measured variables, as tables show them."""
+"""Measured variables, as tables show them; not every map has all of them."""
 
+MEASURED_ATTEMPTS = (
+    "path_length", "path_length_planned", "tcp_path_length", "planning_cpu_time",
+    "planning_time", "simplification_time", "execution_time",
+)  # fmt: skip
 QUADRANTS = ("NE", "NW", "SE", "SW")
 
 
@@ -103,8 +116,14 @@ class BinSummary:
     saturation : Saturation
     causes : Causes
     measures : mapping of str to Spread
-        By variable, see :data:`MEASURES`.
+        By variable, see :data:`MEASURES`; margins are over test grasps.
     quadrants : tuple of QuadrantSummary
+    shares : ReachedShares
+        Reachability of frames, directions and points.
+    reliability : mapping of str to Reliability
+        By what J is made of, see :func:`term_reliability`.
+    unreached : EvidenceSummary or None
+        Behind ``no_path_found``; None where the map does not tell.
     """
 
     grasps: int
@@ -117,6 +136,9 @@ class BinSummary:
     causes: Causes
     measures: dict[str, Spread]
     quadrants: tuple[QuadrantSummary, ...]
+    shares: ReachedShares
+    reliability: dict[str, Reliability]
+    unreached: EvidenceSummary | None
 
 
 def summarise_bin(record: BinMap) -> BinSummary:
@@ -132,7 +154,19 @@ def summarise_bin(record: BinMap) -> BinSummary:
         causes=causes_of(record),
         measures=_measures(record),
         quadrants=tuple(_quadrant(record, name) for name in QUADRANTS),
+        shares=reached_shares(record),
+        reliability=term_reliability(record),
+        unreached=_unreached(record),
     )
+
+
+def _unreached(record: BinMap) -> EvidenceSummary | None:
+    if record.component is None:
+        return None
+    # Attempts are those of the components; further ones are in the saturation.
+    none = np.zeros_like(record.status)
+    frames = [(record.status, record.component, none)]
+    return evidence_of(frames, Status.NO_PATH_FOUND, record.components)
 
 
 def in_quadrant(record: BinMap, name: str) -> BoolArray:
@@ -164,7 +198,27 @@ def spread_of(values: FloatArray) -> Spread:
 
 def _measures(record: BinMap, chosen: BoolArray | None = None) -> dict[str, Spread]:
     rows = slice(None) if chosen is None else chosen
-    return {name: spread_of(getattr(record, name)[rows].ravel()) for name in MEASURES}
+    return {
+        name: spread_of(values[rows].ravel())
+        for name, values in measured_values(record).items()
+    }
+
+
+def measured_values(record: BinMap) -> dict[str, FloatArray]:
+    """Arrays behind the measures that a map has, NaN where nothing was measured."""
+    values: dict[str, FloatArray] = {
+        name: getattr(record, name) for name in MEASURED_ATTEMPTS
+    }
+    if record.effort is not None:
+        found = record.path_found == 1
+        values["effort_checks"] = np.where(found, record.effort.checks, np.nan)
+    if record.times is not None:
+        values["approach_time"] = record.times.approach
+        values["retreat_time"] = record.times.retreat
+    if record.margins is not None:
+        for name in ("clearance", "joint_margin", "smallest_singular_value"):
+            values[name] = getattr(record.margins, name)
+    return values
 
 
 def _quadrant(record: BinMap, name: str) -> QuadrantSummary:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from reachmap._typing import BoolArray, FloatArray, IntArray
@@ -48,14 +50,15 @@ def direction_percent(
 
     Parameters
     ----------
-    found, attempted : bool array, shape (nl, ny, nx, no)
+    found, attempted : bool array, shape (..., no)
         Test grasps with a path, and those that were tried.
-    quaternion_wxyz : array, shape (nl, ny, nx, no, 4)
+    quaternion_wxyz : array, shape (..., no, 4)
+        Or (no, 4), where every point has the same orientations.
     approach_axis : str
 
     Returns
     -------
-    directions, points : array, shape (nl, ny, nx)
+    directions, points : array, shape (...)
         Percent; points are 100 or 0. NaN where nothing was tried.
     """
     shape, no = found.shape[:-1], found.shape[-1]
@@ -75,6 +78,42 @@ def direction_percent(
     np.divide(100.0 * hits, total, out=directions, where=total > 0)
     points = np.where(total > 0, 100.0 * (hits > 0), np.nan)
     return directions.reshape(shape), points.reshape(shape)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReachedShares:
+    """Three answers to what share of a bin is reached [percent], NaN of nothing.
+
+    Attributes
+    ----------
+    frames : float
+        Test grasps with a path, as in the paper.
+    directions : float
+        Approach directions with a path for at least one roll.
+    points : float
+        Points with at least one such direction.
+    """
+
+    frames: float
+    directions: float
+    points: float
+
+
+def reached_shares(record: BinMap) -> ReachedShares:
+    """Reachability of frames, directions and points of a bin map, over all points."""
+    directions, points = reachability_of_directions(record)
+    tried = record.status != Status.NOT_ATTEMPTED
+    found = record.status == Status.PATH_FOUND
+    return ReachedShares(
+        frames=_mean(np.where(tried, 100.0 * found, np.nan)),
+        directions=_mean(directions),
+        points=_mean(points),
+    )
+
+
+def _mean(values: FloatArray) -> float:
+    known = values[~np.isnan(values)]
+    return float(known.mean()) if known.size else float("nan")
 
 
 def reachability_of_directions(record: BinMap) -> tuple[FloatArray, FloatArray]:

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from reachmap._typing import FloatArray
-from reachmap.maps.records import KINDS, CubeMap, Status, WorkspaceMap, stitch_cubes
+from reachmap.maps.records import KINDS, Status, WorkspaceMap, stitch_cubes
+from reachmap.maps.summary.evidence import EvidenceSummary, evidence_of
 from reachmap.maps.summary.statistics import Causes, best_level, causes_of, level_means
 
 
@@ -42,25 +41,6 @@ class LevelSummary:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class EvidenceSummary:
-    """What a set of frames rests on.
-
-    Attributes
-    ----------
-    frames : int
-    components : int
-        Components of the roadmap that they lie in; 0 where frames were planned to one
-        by one.
-    attempts : int
-        Planning attempts, each component's counted once.
-    """
-
-    frames: int
-    components: int
-    attempts: int
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class WorkspaceSummary:
     """A workspace map in a few numbers.
 
@@ -88,14 +68,16 @@ class WorkspaceSummary:
 def summarise_workspace(record: WorkspaceMap) -> WorkspaceSummary:
     """Count frames, levels, causes and evidence of a workspace map."""
     cubes = tuple(record.cubes.values())
+    frames = [(cube.status, cube.component, cube.attempts) for cube in cubes]
+    components = record.components
     return WorkspaceSummary(
         frames=sum(cube.status.size for cube in cubes),
         method=record.method,
         levels=_levels(record),
         best_level=best_level(record.path_reachability),
         causes=causes_of(record),
-        reached=_evidence(cubes, Status.PATH_FOUND),
-        unreached=_evidence(cubes, Status.NO_PATH_FOUND),
+        reached=evidence_of(frames, Status.PATH_FOUND, components),
+        unreached=evidence_of(frames, Status.NO_PATH_FOUND, components),
     )
 
 
@@ -128,28 +110,4 @@ def _levels(record: WorkspaceMap) -> tuple[LevelSummary, ...]:
             ik_free_percent=float(means["ik_free"][k]),
         )
         for k in range(len(record.z))
-    )
-
-
-def _evidence(cubes: tuple[CubeMap, ...], status: Status) -> EvidenceSummary:
-    chosen = [cube.status == status for cube in cubes]
-    component, attempts = (
-        np.concatenate(
-            [
-                getattr(cube, name)[rows]
-                for cube, rows in zip(cubes, chosen, strict=True)
-            ]
-        ).astype(np.int64)
-        for name in ("component", "attempts")
-    )
-    alone = component < 0
-    labels, place = np.unique(component[~alone], return_inverse=True)
-    # A frame counts the attempts of every component that one of its goals lies in, so
-    # the least count among the frames of a component is closest to its own.
-    least = np.full(len(labels), np.iinfo(np.int64).max)
-    np.minimum.at(least, place, attempts[~alone])
-    return EvidenceSummary(
-        frames=len(component),
-        components=len(labels),
-        attempts=int(attempts[alone].sum() + least.sum()),
     )

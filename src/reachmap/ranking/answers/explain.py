@@ -124,11 +124,12 @@ def _attempts_line(
     at = tuple(ranked.ranking.test_grasp[row].tolist())
     found = bin_map.path_found[at]
     text = f"{int(found.sum())} of {found.size} found a path"
-    if found.any():
-        point, orientation = np.ravel_multi_index(at[:3], ranker.table.shape[:3]), at[3]
+    point, orientation = np.ravel_multi_index(at[:3], ranker.table.shape[:3]), at[3]
+    if ranker.table.reachable[point, orientation]:
         length, planning, execution = ranker.table.means[point, orientation]
+        whose = "mean path length" if found.any() else "the roadmap's own path:"
         return (
-            f"{text}; mean path length {length:.2f} rad, planning "
+            f"{text}; {whose} {length:.2f} rad, planning "
             f"{1e3 * planning:.1f} ms, execution {execution:.2f} s"
         )
     return f"{text}: {_cause(at, bin_map)}"
@@ -142,7 +143,7 @@ def _cause(at: tuple[int, ...], bin_map: BinMap) -> str:
         Status.NO_IK: "no inverse-kinematics solution",
         Status.IK_IN_COLLISION: "every inverse-kinematics solution collides",
         Status.NO_PATH_FOUND: "solutions free of collision, but no path found",
-        Status.PATH_FOUND: "the roadmap proves a path, but no attempt found one",
+        Status.PATH_FOUND: "the roadmap proves a path, but none is stored",
         Status.APPROACH_BLOCKED: "the straight approach collides",
         Status.NOT_ATTEMPTED: "not attempted",
         Status.ERROR: "the planner failed",
