@@ -11,20 +11,28 @@ from scipy.stats import binomtest
 from reachmap.cell.model.orientations import ConeFamily
 from reachmap.geometry import yaw_transform
 from reachmap.maps.records import Status
+from reachmap.maps.summary.directions import reached_shares
 from reachmap.plots.approach import STATUS_COLOURS, draw_approach, sunburst_sectors
-from reachmap.plots.bin_map import draw_costs, draw_reachability
+from reachmap.plots.bin_map import (
+    draw_clearance,
+    draw_costs,
+    draw_directions,
+    draw_reachability,
+)
 from reachmap.plots.causes import causes_of, draw_causes
 from reachmap.plots.parts.bin_view import percent_after
 from reachmap.plots.parts.squares import percent_text
 from reachmap.plots.placement import draw_placement, placement_words
 from reachmap.plots.saturation import draw_saturation, saturation_of, wilson_interval
 from reachmap.sampling.orientations import approach_directions, orientation_set
+from tests.support.ranking_maps import make_bin_map
 from tests.support.synthetic_maps import (
     statuses,
     synthetic_bin_map,
     synthetic_placement,
     synthetic_workspace_map,
 )
+from tests.support.synthetic_parts import bin_with_parts
 
 CONE = ConeFamily(tilts_deg=(0.0, 30.0), azimuths=(1, 8), rolls=3)
 
@@ -251,3 +259,27 @@ def test_placement_shows_bins_where_they_would_stand() -> None:
     words = " ".join(text.get_text() for text in figure.texts)
     assert "+x 120 mm, −x 80 mm, +yaw 23°, −yaw 20°" in words
     assert "1 the bin meets pedestal" in words
+
+
+def test_directions_are_drawn_beside_frames_and_points() -> None:
+    """Three panels whose titles are the shares that the summary states."""
+    bin_map = make_bin_map(shape=(1, 3, 4), reachable=0.2)
+    shares = reached_shares(bin_map)
+    titles = [axes.get_title(loc="left") for axes in draw_directions(bin_map).axes[:3]]
+    expected = (shares.frames, shares.directions, shares.points)
+    assert [title.rsplit(" · ")[1] for title in titles] == [
+        f"{share:.2f} %" for share in expected
+    ]
+    assert expected[0] < expected[1] < expected[2]
+
+
+def test_clearance_is_drawn_in_millimetres() -> None:
+    """The narrowest and the median of each point, as the squares are written."""
+    bin_map = bin_with_parts(synthetic_bin_map(0.6, shape=(1, 2, 3, 5, 1)))
+    clearance = 1e3 * bin_map.margins.clearance[0]
+    figure = draw_clearance(bin_map)
+    for axes, pick in zip(figure.axes[:2], (np.nanmin, np.nanmedian), strict=True):
+        written = sorted(float(text.get_text()) for text in axes.texts if
+                         text.get_text()[0].isdigit())  # fmt: skip
+        expected = sorted(np.round(pick(clearance, axis=-1).ravel(), 1))
+        np.testing.assert_allclose(written, expected, atol=0.051)

@@ -23,6 +23,7 @@ from tests.support.synthetic_maps import (
     synthetic_provenance,
     synthetic_workspace_map,
 )
+from tests.support.synthetic_parts import bin_with_parts
 
 PNG = b"\x89PNG\r\n\x1a\n"
 
@@ -40,7 +41,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
     """Leave the drawing out where only files and names matter."""
     monkeypatch.setattr("reachmap.plots.parts.files.figure_bytes", lambda *a, **k: PNG)
-    for name in ("level", "overview", "reachability", "costs", "approach",
+    for name in ("level", "overview", "reachability", "costs", "approach", "directions", "clearance",
                  "saturation", "causes", "placement"):  # fmt: skip
         monkeypatch.setattr(f"reachmap.plots.albums.draw_{name}", lambda *a, **k: None)
 
@@ -147,6 +148,7 @@ def test_bin_map_gives_the_pictures_of_a_bin(folder: Path) -> None:
     stems = [Path(name).stem for name in names(run("bin.h5"))]
     assert stems == [
         "bin_reachability",
+        "bin_directions",
         "bin_costs",
         "bin_approach",
         "bin_saturation",
@@ -155,6 +157,10 @@ def test_bin_map_gives_the_pictures_of_a_bin(folder: Path) -> None:
     write_bin_map(folder / "two.h5", synthetic_bin_map(shape=(2, 1, 2, 3, 1)))
     stems = [Path(name).stem for name in names(run("two.h5", "-o", "two", "--csv"))]
     assert "bin_reachability_layer+0.05" in stems
+    assert "bin_saturation" not in stems  # one attempt saturates nothing
+    parts = bin_with_parts(synthetic_bin_map(shape=(1, 1, 2, 3, 1)))
+    write_bin_map(folder / "parts.h5", parts)
+    assert "bin_clearance.png" in [Path(n).name for n in names(run("parts.h5"))]
     assert "bin_approach_layer+0.10" in stems
     assert (folder / "two" / "bin_reachability_layer+0.10.csv").is_file()
 

@@ -21,7 +21,8 @@ from tests.support.toy_artefacts import toy_bin_map, toy_workspace
 
 DRAWINGS = {
     "map_parts": ("draw_level", "draw_overview", "draw_placement", "draw_approach",
-                  "draw_reachability", "draw_costs", "draw_saturation"),
+                  "draw_reachability", "draw_costs", "draw_saturation",
+                  "draw_directions", "draw_clearance"),
     "cause_part": ("draw_causes",),
     "ranking_part": ("ranking_chart",),
 }  # fmt: skip

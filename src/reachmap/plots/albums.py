@@ -13,7 +13,12 @@ from reachmap._typing import FloatArray
 from reachmap.errors import SettingsError
 from reachmap.maps.records import BinMap, BinPlacement, WorkspaceMap
 from reachmap.plots.approach import draw_approach
-from reachmap.plots.bin_map import draw_costs, draw_reachability
+from reachmap.plots.bin_map import (
+    draw_clearance,
+    draw_costs,
+    draw_directions,
+    draw_reachability,
+)
 from reachmap.plots.causes import draw_causes
 from reachmap.plots.comparison import MapChange, draw_change_sheet, draw_comparison
 from reachmap.plots.heatmap import draw_level
@@ -150,6 +155,11 @@ def bin_album(
                 ),
             ),
             Picture(
+                name=f"bin_directions{end}",
+                title="Path reachability of test grasps, directions and points",
+                draw=partial(draw_directions, bin_map, layer, percent_map=percent_map),
+            ),
+            Picture(
                 name=f"bin_costs{end}",
                 title="What reaching into the bin costs",
                 draw=partial(draw_costs, bin_map, cost, layer),
@@ -160,17 +170,29 @@ def bin_album(
                 draw=partial(draw_approach, bin_map, layer),
             ),
         ]
+        if bin_map.margins is not None:
+            items.append(
+                Picture(
+                    name=f"bin_clearance{end}",
+                    title="Clearance on the way in",
+                    draw=partial(draw_clearance, bin_map, layer),
+                )
+            )
         if tables:
             repeats = bin_map.path_found.shape[-1]
             values = percent_after(bin_map, repeats)[layer]
             text = level_table(bin_map.x, bin_map.y, values)
             items.append(Table(name=f"bin_reachability{end}", text=text))
-    saturation = Picture(
-        name="bin_saturation",
-        title="Test grasps reached over the number of attempts",
-        draw=partial(draw_saturation, bin_map),
-    )
-    return [*items, saturation, _causes_picture(bin_map, "bin_causes")]
+    # One attempt has no saturation.
+    if bin_map.path_found.shape[-1] > 1:
+        items.append(
+            Picture(
+                name="bin_saturation",
+                title="Test grasps reached over the number of attempts",
+                draw=partial(draw_saturation, bin_map),
+            )
+        )
+    return [*items, _causes_picture(bin_map, "bin_causes")]
 
 
 def placement_album(

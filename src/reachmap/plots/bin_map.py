@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +12,7 @@ from matplotlib.figure import Figure
 
 from reachmap._typing import FloatArray
 from reachmap.maps.records import BinMap
+from reachmap.maps.summary.directions import reachability_of_directions
 from reachmap.plots.parts.bin_view import (
     BinView,
     attempted,
@@ -52,37 +55,86 @@ def draw_reachability(
     layer : int
         Index of the layer of test grasps.
     """
-    view = view_of(bin_map)
     repeats = bin_map.path_found.shape[-1]
-    counts = [1] if repeats == 1 else [1, repeats]
+    panels = [
+        (_share_text(bin_map, layer, n), percent_after(bin_map, n)[layer])
+        for n in ([1] if repeats == 1 else [1, repeats])
+    ]
+    return _draw_row(
+        bin_map, layer, panels, "Path reachability in the bin", percent_map
+    )
+
+
+@drawing()
+def draw_directions(
+    bin_map: BinMap, layer: int = 0, *, percent_map: PercentMap = "RdYlGn"
+) -> Figure:
+    """Reachability of frames, of directions and of points, side by side.
+
+    Parameters
+    ----------
+    bin_map : BinMap
+    layer : int
+        Index of the layer of test grasps.
+    """
+    directions, points = reachability_of_directions(bin_map)
+    named = (
+        ("test grasps", bin_map.path_reachability),
+        ("directions, with at least one roll", directions),
+        ("points, with at least one direction", points),
+    )
+    panels = [
+        (f"{name} · {_mean_text(values[layer])}", values[layer])
+        for name, values in named
+    ]
+    title = "Path reachability of test grasps, directions and points"
+    return _draw_row(bin_map, layer, panels, title, percent_map, widest=WIDEST * 0.8)
+
+
+def _mean_text(values: FloatArray) -> str:
+    known = values[~np.isnan(values)]
+    return f"{known.mean():.2f} %" if known.size else "not attempted"
+
+
+def _draw_row(
+    bin_map: BinMap,
+    layer: int,
+    panels: Sequence[tuple[str, FloatArray]],
+    title: str,
+    percent_map: PercentMap,
+    *,
+    widest: float = WIDEST,
+) -> Figure:
+    """Percentages of a layer side by side, under one title and with one scale."""
+    view = view_of(bin_map)
     low, high = view.view()
-    scale_in = min(WIDEST / (high[0] - low[0]), TALLEST / (high[1] - low[1]))
+    scale_in = min(widest / (high[0] - low[0]), TALLEST / (high[1] - low[1]))
     width, height = (high - low) * scale_in
     figure = new_figure(
-        LEFT + len(counts) * (width + 0.35) - 0.35 + RIGHT, BOTTOM + height + TOP
+        LEFT + len(panels) * (width + 0.35) - 0.35 + RIGHT, BOTTOM + height + TOP
     )
     left = LEFT
-    for column, attempts in enumerate(counts):
+    for column, (text, values) in enumerate(panels):
         left = LEFT + column * (width + 0.35)
         axes = axes_at(figure, left, BOTTOM, width, height)
         mesh = draw_squares(
             axes,
             bin_map.x,
             bin_map.y,
-            percent_after(bin_map, attempts)[layer],
+            values,
             colours=colour_map(percent_map),
             scale=PERCENT_SCALE,
             font_size=number_size(bin_map.x, bin_map.y, scale_in),
         )
         frame_bin(axes, view)
         axis_titles(axes, "the bin")
-        axes.set_title(_share_text(bin_map, layer, attempts), loc="left", pad=6)
+        axes.set_title(text, loc="left", pad=6)
         if column:
             axes.set_ylabel("")
             axes.tick_params(labelleft=False)
     bar = (left + width + 0.15, BOTTOM, 0.16, height)
     colour_bar(figure, mesh, bar, "Path reachability [%]")
-    put_title(figure, LEFT, "Path reachability in the bin", _subtitle(view, layer))
+    put_title(figure, LEFT, title, _subtitle(view, layer))
     return figure
 
 
@@ -112,6 +164,37 @@ class _Panel:
 
 
 @drawing()
+def draw_clearance(bin_map: BinMap, layer: int = 0) -> Figure:
+    """Clearance at each point [mm]: of its narrowest best path, and of the median.
+
+    Parameters
+    ----------
+    bin_map : BinMap
+        With margins.
+    layer : int
+        Index of the layer of test grasps.
+    """
+    if bin_map.margins is None:
+        raise ValueError("the bin map has no margins")
+    clearance = 1e3 * bin_map.margins.clearance[layer]
+    known = ~np.isnan(clearance)
+    least = np.where(known, clearance, np.inf).min(axis=-1)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # points without any path
+        median = np.nanmedian(clearance, axis=-1)
+    panels = [
+        _Panel(title=title, unit="mm", values=values, digits=1)
+        for title, values in (
+            ("Narrowest test grasp", np.where(known.any(axis=-1), least, np.nan)),
+            ("Median test grasp", median),
+        )
+    ]
+    view = view_of(bin_map)
+    said = f"least distance of two bodies on the way in · {_subtitle(view, layer)}"
+    return _draw_panels(bin_map, view, panels, "How close it gets", said)
+
+
+@drawing()
 def draw_costs(
     bin_map: BinMap, cost: FloatArray | None = None, layer: int = 0
 ) -> Figure:
@@ -131,14 +214,27 @@ def draw_costs(
     """
     view = view_of(bin_map)
     panels = _cost_panels(bin_map, cost, layer)
+    said = f"mean over the test grasps reached at each point · {_subtitle(view, layer)}"
+    return _draw_panels(bin_map, view, panels, "What reaching into the bin costs", said)
+
+
+def _draw_panels(
+    bin_map: BinMap,
+    view: BinView,
+    panels: Sequence[_Panel],
+    title: str,
+    subtitle: str,
+) -> Figure:
+    """Two panels a row, each with its own scale."""
+    rows = -(-len(panels) // 2)
     low, high = view.view()
     scale_in = min(5.6 / (high[0] - low[0]), TALLEST / (high[1] - low[1]))
     width, height = (high - low) * scale_in
     across, down = width + 1.15, height + 0.75
-    figure = new_figure(LEFT + 2 * across - 0.35, 2 * down + BOTTOM + TOP - 0.75)
+    figure = new_figure(LEFT + 2 * across - 0.35, rows * down + BOTTOM + TOP - 0.75)
     for index, panel in enumerate(panels):
         row, column = divmod(index, 2)
-        left, bottom = LEFT + column * across, BOTTOM + (1 - row) * down
+        left, bottom = LEFT + column * across, BOTTOM + (rows - 1 - row) * down
         axes = axes_at(figure, left, bottom, width, height)
         mesh = draw_squares(
             axes,
@@ -158,22 +254,24 @@ def draw_costs(
         legend.ax.set_title(panel.unit, fontsize=8.5, pad=6)
         if column:
             axes.set_ylabel("")
-        if row == 0 and index + 2 < len(panels):
+        if index + 2 < len(panels):
             axes.set_xlabel("")
-    subtitle = (
-        f"mean over the test grasps reached at each point · {_subtitle(view, layer)}"
-    )
-    put_title(figure, LEFT, "What reaching into the bin costs", subtitle)
+    put_title(figure, LEFT, title, subtitle)
     return figure
 
 
 def _cost_panels(bin_map: BinMap, cost: FloatArray | None, layer: int) -> list[_Panel]:
-    cpu = _point_means(bin_map.planning_cpu_time[layer])
-    milliseconds = bool(np.nanmax(cpu, initial=0.0) < 1.0)
-    planning = cpu * 1000.0 if milliseconds else cpu
+    name, attempts = "Planning time (CPU)", bin_map.planning_cpu_time
+    if bin_map.effort is not None:
+        name, seconds = "Planning effort", bin_map.effort.seconds_per_check
+        checks = np.where(bin_map.path_found == 1, bin_map.effort.checks, np.nan)
+        attempts = checks * seconds
+    planning = _point_means(attempts[layer])
+    milliseconds = bool(np.nanmax(planning, initial=0.0) < 1.0)
+    planning = planning * 1000.0 if milliseconds else planning
     named = [
         ("Path length", "rad", _point_means(bin_map.path_length[layer])),
-        ("Planning time (CPU)", "ms" if milliseconds else "s", planning),
+        (name, "ms" if milliseconds else "s", planning),
         ("Execution time", "s", _point_means(bin_map.execution_time[layer])),
     ]
     if cost is not None:

@@ -6,6 +6,7 @@ import numpy as np
 
 from reachmap.maps.records import BinMap, BinPlacement, WorkspaceMap
 from reachmap.maps.summary.bin import MEASURES, BinSummary, summarise_bin
+from reachmap.maps.summary.evidence import EvidenceSummary
 from reachmap.maps.summary.placement import (
     CandidateSummary,
     PlacementSummary,
@@ -13,7 +14,12 @@ from reachmap.maps.summary.placement import (
 )
 from reachmap.maps.summary.workspace import WorkspaceSummary, summarise_workspace
 from reachmap.plots.approach import draw_approach
-from reachmap.plots.bin_map import draw_costs, draw_reachability
+from reachmap.plots.bin_map import (
+    draw_clearance,
+    draw_costs,
+    draw_directions,
+    draw_reachability,
+)
 from reachmap.plots.heatmap import draw_level
 from reachmap.plots.overview import draw_overview
 from reachmap.plots.parts.levels import level_names
@@ -179,10 +185,24 @@ def bin_section(record: BinMap) -> Section:
     pictures = []
     for layer, name in enumerate(level_names(record.layer)):
         where = f" in the layer {name} m above the bottom" if summary.layers > 1 else ""
+        if record.margins is not None:
+            pictures.append(
+                drawn(
+                    draw_clearance(record, layer),
+                    f"How close bodies come on the way in{where} [mm].",
+                    record,
+                )
+            )
         pictures += [
             drawn(
                 draw_reachability(record, layer),
                 f"Path reachability at each point{where}.",
+                record,
+            ),
+            drawn(
+                draw_directions(record, layer),
+                "A part needs one roll, and one direction, not all: the share of test "
+                f"grasps, of directions and of points that are reached{where}.",
                 record,
             ),
             drawn(
@@ -205,13 +225,44 @@ def bin_section(record: BinMap) -> Section:
         ),
         _quadrant_table(summary),
         pictures,
-        drawn(
-            draw_saturation(record),
-            "How the share grows with the number of attempts; bars are 95 % intervals.",
-            record,
-        ),
+        _shares_paragraph(summary),
+        _saturation(record),
+        _evidence_paragraph(summary.unreached),
         Heading("What a pick takes"),
         _measure_table(summary),
+    )
+
+
+def _shares_paragraph(summary: BinSummary) -> Blocks:
+    shares = summary.shares
+    return paragraph(
+        f"Reached are {percent(shares.frames)} of the test grasps, "
+        f"{percent(shares.directions)} of the approach directions (with at least one "
+        f"roll of the tool) and {percent(shares.points)} of the points (from at least "
+        "one direction)."
+    )
+
+
+def _saturation(record: BinMap) -> Blocks:
+    """Only attempts of a planner that were repeated saturate."""
+    if record.path_found.shape[-1] < 2:
+        return None
+    return drawn(
+        draw_saturation(record),
+        "How the share grows with the number of attempts; bars are 95 % intervals.",
+        record,
+    )
+
+
+def _evidence_paragraph(evidence: EvidenceSummary | None) -> Blocks:
+    """What stands behind test grasps without a path."""
+    if evidence is None or not evidence.frames or evidence.checks is None:
+        return None
+    methods = ", ".join(f"{n} {c:,}" for n, c in evidence.method_checks.items())
+    return paragraph(
+        f"No path was found to {count(evidence.frames, 'test grasp')} with a free "
+        f"goal, after {evidence.checks:,} state checks ({methods}); an independent "
+        f"method agrees on {evidence.agreed} of them."
     )
 
 

@@ -74,7 +74,7 @@ def test_a_part_needs_one_roll() -> None:
 
 
 def test_reliability_is_the_analysis_of_variance() -> None:
-    """The F of SciPy gives the same share for balanced groups; unequal ones recover it."""
+    """SciPy's F gives the same share of balanced groups; unequal ones recover it."""
     rng = np.random.default_rng(3)
     true = rng.normal(0.0, 2.0, 400)
     values = true[:, None] + rng.normal(0.0, 1.0, (400, 4))
