@@ -41,8 +41,8 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
     """Leave the drawing out where only files and names matter."""
     monkeypatch.setattr("reachmap.plots.parts.files.figure_bytes", lambda *a, **k: PNG)
-    for name in ("level", "overview", "reachability", "costs", "approach", "directions", "clearance",
-                 "saturation", "causes", "placement"):  # fmt: skip
+    for name in ("level", "overview", "reachability", "costs", "approach", "directions",
+                 "clearance", "saturation", "causes", "placement"):  # fmt: skip
         monkeypatch.setattr(f"reachmap.plots.albums.draw_{name}", lambda *a, **k: None)
 
 
@@ -160,7 +160,9 @@ def test_bin_map_gives_the_pictures_of_a_bin(folder: Path) -> None:
     assert "bin_saturation" not in stems  # one attempt saturates nothing
     parts = bin_with_parts(synthetic_bin_map(shape=(1, 1, 2, 3, 1)))
     write_bin_map(folder / "parts.h5", parts)
-    assert "bin_clearance.png" in [Path(n).name for n in names(run("parts.h5"))]
+    assert "bin_clearance.png" in [
+        Path(n).name for n in names(run("parts.h5", "-o", "parts"))
+    ]
     assert "bin_approach_layer+0.10" in stems
     assert (folder / "two" / "bin_reachability_layer+0.10.csv").is_file()
 
