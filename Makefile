@@ -17,12 +17,15 @@ BIN      := $(VENV)/bin
 PIP      := $(BIN)/python -m pip --disable-pip-version-check -qq
 REACHMAP := $(BIN)/reachmap
 SCAN     := -j $(WORKERS) --overwrite
+# Programs that look after the lock file; they are no part of any environment.
+TOOLS    := build/tools/bin
+FUZZ_S   ?= 60
 RESULTS  := $(RUN)/.pictures $(RUN)/ranked.json $(RUN)/report.html
 
 .DEFAULT_GOAL := run
 .DELETE_ON_ERROR:
 .PHONY: help run paper quick install dev test test-slow lint check docs bench wheel view \
-        clean clean-run
+        clean clean-run test-lowest fuzz lock sbom audit
 
 help: ## Show this list
 	@awk 'BEGIN {FS = ":.*## "} /^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -43,6 +46,32 @@ test: $(VENV)/.dev ## Run the default test suite (COVERAGE=yes measures it)
 
 test-slow: $(VENV)/.dev ## Run the tests that take minutes
 	$(BIN)/python -m pytest -n $(JOBS) -m slow --hypothesis-profile=explore
+
+test-lowest: $(TOOLS)/uv ## Run the default suite with the oldest dependencies that are allowed
+	$(TOOLS)/uv pip compile -q --resolution lowest-direct --only-binary :all: --extra test pyproject.toml \
+	    --python-version 3.11 -o build/lowest.txt
+	$(TOOLS)/uv venv -q --clear --python 3.11 build/lowest
+	$(TOOLS)/uv pip install -q --python build/lowest/bin/python -r build/lowest.txt
+	$(TOOLS)/uv pip install -q --python build/lowest/bin/python --no-deps --editable .
+	build/lowest/bin/python -m pytest -n $(JOBS)
+
+fuzz: $(VENV)/.dev ## Let a fuzzer at every reader of files, FUZZ_S seconds each
+	$(PIP) install --editable '.[fuzz]'
+	@set -e; for target in cell urdf srdf limits grasps hdf5; do \
+	    $(BIN)/python -m tests.fuzz.readers $$target -max_total_time=$(FUZZ_S); done
+
+lock: $(TOOLS)/uv ## Write requirements.lock: the newest versions, with their hashes
+	$(TOOLS)/uv pip compile -q --universal --python-version 3.11 --generate-hashes --upgrade \
+	    --no-annotate --no-emit-index-url --no-emit-find-links \
+	    --custom-compile-command "make lock" --extra xacro --extra view --extra dask \
+	    --extra xarray pyproject.toml -o requirements.lock
+
+sbom: $(TOOLS)/uv ## Write build/sbom.json (CycloneDX) of requirements.lock
+	$(TOOLS)/cyclonedx-py requirements requirements.lock --pyproject pyproject.toml \
+	    --output-reproducible -o build/sbom.json
+
+audit: $(TOOLS)/uv ## Look the versions of requirements.lock up among known vulnerabilities
+	$(TOOLS)/pip-audit --requirement requirements.lock --require-hashes --disable-pip
 
 lint: $(VENV)/.dev view ## Format, lint, types, architecture
 	$(BIN)/ruff check .
@@ -77,6 +106,10 @@ clean: ## Remove what was built; keep the environment and the results
 
 clean-run: ## Remove the results of the pipeline
 	rm -rf run
+
+$(TOOLS)/uv:
+	$(PYTHON) -m venv build/tools
+	$(TOOLS)/python -m pip install -qq uv cyclonedx-bom pip-audit
 
 # --- environment ------------------------------------------------------------------
 

@@ -455,3 +455,12 @@ def test_angles_of_quaternions_are_those_of_matrices(seed, angle):
     assert quaternion_angle(q[0], -q[1]) == pytest.approx(angle, abs=1e-7)
     by_matrix = rotation_angle(a.as_matrix(), b.as_matrix())
     assert quaternion_angle(*q) == pytest.approx(float(by_matrix), abs=1e-7)
+
+
+@pytest.mark.parametrize("nothing", [[], (), np.zeros(0), np.zeros((0, 3))])
+def test_an_image_without_grasps_is_ranked(nothing):
+    """Empty lists have no second dimension; they are no mistake of the loop."""
+    ranker = Ranker(make_bin_map())
+    for how in ({"directions": nothing}, {"rotations": np.zeros((0, 3, 3))}):
+        ranking = ranker.rank(nothing, **how)
+        assert len(ranking.order) == len(ranking.cost) == 0

@@ -76,6 +76,9 @@ def _array(
     finite: bool = True,
 ) -> FloatArray:
     array = np.asarray(value, dtype=float)
+    if array.shape == (0,):
+        # A network that has found nothing hands over an empty list.
+        array = array.reshape(0, *row)
     if array.shape[1:] != row or array.ndim == 0 or (n is not None and len(array) != n):
         wanted = ("n" if n is None else n, *row)
         raise SettingsError(f"{name} must have the shape {wanted} (got {array.shape})")
