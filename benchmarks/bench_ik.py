@@ -13,7 +13,7 @@ import numpy as np
 
 from reachmap._typing import FloatArray
 from reachmap.cell.loading import read_cell
-from reachmap.cell.model.cell import IkSpec
+from reachmap.cell.model.cell import IkSpec, RobotSpec
 from reachmap.core.kinematics.kinematics import Kinematics
 from reachmap.core.robot.model import RobotModel
 from reachmap.geometry import rotation_from_rpy_deg, transform_from_parts
@@ -80,6 +80,56 @@ def time_arm(name: str, spec: IkSpec, batch: int, single: int) -> None:
     )
 
 
+def offset_wrist() -> RobotModel:
+    """Arm with two parallel axes and no meeting ones at the wrist: no closed form."""
+    joints = [
+        ("0 0 0.28", "0 0 1"),
+        ("0 0 0", "0 1 0"),
+        ("0 0 0.7", "0 1 0"),
+        ("0.5 0 0.1", "1 0 0"),
+        ("0 0 0.16", "0 1 0"),
+        ("0.13 0 0", "1 0 0"),
+    ]
+    parts = ['<robot name="arm"><link name="l0"/>']
+    for k, (xyz, axis) in enumerate(joints, start=1):
+        parts.append(
+            f'<link name="l{k}"/><joint name="j{k}" type="revolute">'
+            f'<parent link="l{k - 1}"/><child link="l{k}"/><origin xyz="{xyz}"/>'
+            f'<axis xyz="{axis}"/><limit lower="-3.14" upper="3.14" velocity="2" '
+            'effort="9"/></joint>'
+        )
+    spec = {"urdf": "arm.urdf", "tcp": {"parent": "l6", "xyz": [0.1, 0.02, 0.0]}}
+    spec["limits"] = {"acceleration_rad_s2": 5.0}
+    return RobotModel.from_spec(
+        RobotSpec.model_validate(spec), urdf="".join([*parts, "</robot>"])
+    )
+
+
+def compare_methods(count: int = 1000) -> None:
+    """Closed form and numeric solver side by side, in and out of reach."""
+    ur5 = RobotModel.from_cell(read_cell("ur5-eye-in-hand"))
+    arms = {
+        "ur5, closed form": Kinematics(ur5),
+        "ur5, numeric": Kinematics(ur5, IkSpec(method="numeric")),
+        "offset wrist, numeric": Kinematics(offset_wrist()),
+    }
+    reference = {}
+    for name, kinematics in arms.items():
+        T = random_poses(kinematics, count)
+        far = T.copy()
+        far[:, :3, 3] += 5.0
+        found, frame = kinematics.solve_many(T, windings=False)
+        missed = np.abs(kinematics.forward_many(found) - T[frame]).max()
+        for what, poses in (("reachable", T), ("out of reach", far)):
+            spent = seconds(
+                lambda k=kinematics, p=poses: k.solve_many(p, windings=False)  # type: ignore[misc]
+            )
+            ratio = spent / reference.setdefault(what, spent)
+            report(f"{name}: {what}, {ratio:.1f} times the closed form", count, spent)
+        solved = len(np.unique(frame))
+        print(f"    {solved} of {count} solved, residual {missed:.0e}")
+
+
 def time_lattice() -> None:
     """Solve all frames of a workspace scan."""
     kinematics = Kinematics(RobotModel.from_cell(read_cell("ur5-eye-in-hand")))
@@ -115,9 +165,10 @@ def time_forward_and_follow() -> None:
 def main() -> None:
     """Run all."""
     time_forward_and_follow()
+    compare_methods()
     time_lattice()
     time_arm("ur5-eye-in-hand", IkSpec(), 5000, 300)
-    time_arm("ur5-eye-in-hand", IkSpec(method="numeric"), 100, 20)
+    time_arm("ur5-eye-in-hand", IkSpec(method="numeric"), 1000, 20)
     time_arm("panda-eye-in-hand", IkSpec(), 500, 50)
     time_arm("planar-toy", IkSpec(), 5000, 300)
 

@@ -11,8 +11,6 @@ from dataclasses import dataclass, field
 from reachmap.cell.files.urdf import UrdfJoint
 from reachmap.cell.text.yaml_writer import WIDTH, scalar
 
-SEVEN_AXES = 7
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StarterChoices:
@@ -152,11 +150,6 @@ def _robot(c: StarterChoices) -> str:
         lines.append("  # Joints that stay where they are [deg, or m if they slide].")
         lines.append(f"  locked_joints_deg: {scalar(dict(c.locked))}")
     lines += _limits(c)
-    if len(c.joints) == SEVEN_AXES and all(map(_turns, c.joints)):
-        lines += [
-            "  # With seven joints, inverse kinematics samples one of them on a grid.",
-            f"  ik: {{redundant_joint: {scalar(c.joints[-1].name)}}}",
-        ]
     return "\n".join(lines) + "\n"
 
 

@@ -68,7 +68,8 @@ class IkSpec(Record):
         32, ge=1, le=1000, description="Starts of the numeric solver."
     )
     redundant_joint: Name | None = Field(
-        None, description="Joint of a 7-axis arm that is sampled on a grid."
+        None,
+        description="Joint that is sampled if there are more than six; default: found.",
     )
     redundant_samples: int = Field(
         25, ge=1, le=1000, description="Values of the redundant joint that are tried."

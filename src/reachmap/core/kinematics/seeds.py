@@ -17,8 +17,11 @@ from reachmap.core.robot.chain import SerialChain
 from reachmap.geometry import inverse_transform
 
 # Rows of the table. Fewer are further from a pose; of more, the nearest ones are of
-# few branches. 2,500 to 5,000 found most branches of HC10, M-430iA and xArm6.
-_SAMPLES = 4000
+# few branches. 2,500 to 5,000 found most branches of HC10, M-430iA and xArm6, whose
+# table has four joints: eight values each.
+_MOST_SAMPLES = 4096
+_SAMPLES_PER_JOINT = 8
+_FEWEST_SAMPLES = 64
 
 # Starts that share a cell of this size lead to one solution [rad].
 _CELL_RAD = 0.6
@@ -57,8 +60,10 @@ class SeedTable:
         self._inner = np.flatnonzero(inner)
         self._set_axes(chain)
         self._cell = np.where(chain.is_revolute, _CELL_RAD, 2 * half_range / _CELLS)
-        spread = 2.0 * spread_points(_SAMPLES, len(self._inner)) - 1.0
-        Q = np.zeros((_SAMPLES, chain.dof))
+        samples = int(_SAMPLES_PER_JOINT ** len(self._inner))
+        samples = min(max(samples, _FEWEST_SAMPLES), _MOST_SAMPLES)
+        spread = 2.0 * spread_points(samples, len(self._inner)) - 1.0
+        Q = np.zeros((samples, chain.dof))
         Q[:, self._inner] = middle[self._inner] + spread * half_range[self._inner]
         self._Q = Q
         self._weight = 1.0

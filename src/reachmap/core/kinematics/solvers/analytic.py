@@ -7,6 +7,8 @@ there, and its least-squares flag is no guide), joint limits and whole turns.
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 
 from reachmap._typing import BoolArray, FloatArray, IntArray
@@ -26,8 +28,8 @@ from reachmap.core.kinematics.solutions import (
     joined,
     wrapped,
 )
-from reachmap.core.kinematics.solvers.arm import Arm, Way
-from reachmap.core.robot.chain import SerialChain
+from reachmap.core.kinematics.solvers.arm import FULL_AXES, Arm, Way
+from reachmap.core.kinematics.solvers.numeric import NumericSolver
 from reachmap.geometry import transform_from_parts
 
 # Poses are turned aside by this angle [rad]: enough for EAIK to be regular again.
@@ -39,6 +41,11 @@ _JUMP_RAD = 0.1
 
 # A pose with so many solutions has all its branches.
 _ALL_BRANCHES = 8
+
+# Misses [m or rad] up to which a row may stand for a solution that the closed form
+# lost, and the share of the self-test below which no row at all may do so, too.
+_NEARLY = 0.5
+_TRUSTED = 0.95
 
 # Frames per block, which bounds the memory of the pairwise comparison.
 _BLOCK = 2048
@@ -68,15 +75,13 @@ class AnalyticSolver:
 
     Parameters
     ----------
-    chain : SerialChain
+    arm : Arm
     form : ClosedForm
-    tolerance : float
-        Largest miss of a solution [m and rad].
     """
 
-    def __init__(self, chain: SerialChain, form: ClosedForm, tolerance: float) -> None:
-        self._chain, self._form, self._rows = chain, form, form.rows
-        self.tolerance = tolerance
+    def __init__(self, arm: Arm, form: ClosedForm) -> None:
+        self._arm, self._chain, self.tolerance = arm, arm.chain, arm.tolerance
+        self._form, self._rows = form, form.rows
 
     @property
     def method(self) -> str:
@@ -114,13 +119,34 @@ class AnalyticSolver:
         """
         tables = []
         for start in range(0, len(T), _BLOCK):
-            Q, frame = self._block(T[start : start + _BLOCK])
+            poses = T[start : start + _BLOCK]
+            raw = self._rows(poses)
+            rows = self._with_singular(self._meeting(raw, poses), raw, poses)
+            Q, frame = rows if self.complete else self._with_lost(rows, raw, poses)
             tables.append((Q, frame + start))
         return joined(tables, self._chain.dof)
 
-    def _block(self, T: FloatArray) -> Rows:
-        raw = self._rows(T)
-        rows = self._meeting(raw, T)
+    def _with_lost(self, rows: Rows, raw: Rows, T: FloatArray) -> Rows:
+        """Seek numerically what the closed form nearly found, or may well lose."""
+        nearest = np.full(len(T), np.inf)
+        missed = matrix_difference(T[raw[1]], self._chain.forward_many(raw[0]))
+        np.minimum.at(nearest, raw[1], missed)
+        if self._chain.dof < FULL_AXES or self._form.score < _TRUSTED * SELF_TESTS:
+            nearest[np.isinf(nearest)] = 0.0
+        missing = nearest <= _NEARLY
+        missing[rows[1]] = False
+        frames = np.flatnonzero(missing)
+        if not len(frames):
+            return rows
+        Q, frame = self._numeric.branches(T[frames])
+        return joined([rows, (Q, frames[frame])], self._chain.dof)
+
+    @cached_property
+    def _numeric(self) -> NumericSolver:
+        return NumericSolver(self._arm)
+
+    def _with_singular(self, rows: Rows, raw: Rows, T: FloatArray) -> Rows:
+        """Add what is missing at singular poses."""
         counts = np.bincount(rows[1], minlength=len(T))
         doubtful = np.flatnonzero(counts < _ALL_BRANCHES)
         if not len(doubtful):
@@ -204,7 +230,7 @@ def _padded(rows: Rows, n: int) -> FloatArray:
 
 def _offer(arm: Arm) -> AnalyticSolver | None:
     form = find_closed_form(arm.chain, tolerance=arm.tolerance)
-    return None if form is None else AnalyticSolver(arm.chain, form, arm.tolerance)
+    return None if form is None else AnalyticSolver(arm, form)
 
 
 WAY = Way(rank=1, is_closed_form=True, offer=_offer)
