@@ -56,6 +56,14 @@ class CollisionChecker:
         Pairs that were proved never to meet.
     reach_m : array, shape (dof,)
         No point of the robot moves further than ``reach_m @ |Δq|`` [m/rad].
+    pair_reach_m : array, shape (pairs, dof)
+        The bodies of a pair move by no more than ``pair_reach_m @ |Δq|`` against each
+        other [m/rad]. Pairs are those of the geometry, several of which may have one
+        name.
+    pair_index : int array, shape (pairs,)
+        Each pair's name, an index into ``body_pairs``.
+    bodies, hulls : pinocchio.GeometryModel
+        What is checked, and the same with convex hulls in place of meshes.
     bound : MotionBound
         The tighter bound of a motion from where the robot is.
     checks : int
@@ -72,14 +80,14 @@ class CollisionChecker:
     ) -> None:
         self.robot = robot
         self._model = robot.body_model
-        self._geometry = bodies.geometry
+        self.bodies = bodies.geometry
         self._movable = {n: k for k, n in enumerate(bodies.names) if n in movable}
         self.safety_margin_m = safety_margin_m
         motion = PairMotion(robot, bodies)
-        self._hulls = _with_convex_hulls(bodies.geometry)
+        self.hulls = _with_convex_hulls(bodies.geometry)
         proved = pairs_that_never_meet(
             robot,
-            self._hulls,
+            self.hulls,
             motion,
             safety_margin_m,
             left_out=frozenset(self._movable.values()),
@@ -87,33 +95,39 @@ class CollisionChecker:
         for first, second in proved:
             pair = pin.CollisionPair(first, second)
             bodies.geometry.removeCollisionPair(pair)
-            self._hulls.removeCollisionPair(pair)
+            self.hulls.removeCollisionPair(pair)
         self.proved_pairs = tuple(
             f"{bodies.names[a]} | {bodies.names[b]}" for a, b in proved
         )
         self._pair_names = bodies.pair_names()
         self.body_pairs = tuple(dict.fromkeys(self._pair_names))
-        self._pair_index = np.array(
+        self.pair_index = np.array(
             [self.body_pairs.index(name) for name in self._pair_names], dtype=np.int64
         )
         self.reach_m = np.maximum(motion.bounds.max(axis=0, initial=0.0), 1e-9)
         self.bound = MotionBound(
             SerialChain.from_robot(robot), robot, bodies, motion.bounds, self.reach_m
         )
-        self._shares = _margin_shares(bodies.geometry, motion, self.reach_m)
+        self.pair_reach_m = np.array(
+            [motion.between(pair)[1] for pair in bodies.geometry.collisionPairs]
+        ).reshape(-1, robot.dof)
+        # A motion that moves no point further than d moves the bodies of a pair by at
+        # most so much of d against each other: two neighbours at the wrist need not
+        # keep the distance that the camera needs from the floor.
+        self._shares = (self.pair_reach_m / self.reach_m).max(axis=1, initial=0.0)
         self.checks = 0
         self._start_engine()
 
     def _start_engine(self) -> None:
         self._data = self._model.createData()
         self._broadphase, self._base = self._broadphase_with(
-            self._geometry, np.full(len(self._pair_names), self.safety_margin_m)
+            self.bodies, np.full(len(self._pair_names), self.safety_margin_m)
         )
         self._ladder = [
             (
                 step,
                 *self._broadphase_with(
-                    self._hulls, self.safety_margin_m + step * self._shares
+                    self.hulls, self.safety_margin_m + step * self._shares
                 ),
             )
             for step in LADDER_M
@@ -123,7 +137,7 @@ class CollisionChecker:
         """Put movable bodies elsewhere, by name and pose (4, 4)."""
         for name, T in T_root_body.items():
             placement = pin.SE3(np.ascontiguousarray(T))
-            for geometry in (self._geometry, self._hulls):
+            for geometry in (self.bodies, self.hulls):
                 geometry.geometryObjects[self._movable[name]].placement = placement
         self._start_engine()
 
@@ -131,7 +145,7 @@ class CollisionChecker:
         data = geometry.createData()
         for request, margin in zip(data.collisionRequests, margins, strict=True):
             request.security_margin = float(margin)
-        _guess_nothing(data.collisionRequests)
+        guess_nothing(data.collisionRequests)
         # The naive manager is the fastest on a cell; the sweep-and-prune one misses
         # collisions (reference: 75 of 10,500).
         manager = pin.BroadPhaseManager_NaiveCollisionManager(
@@ -178,10 +192,10 @@ class CollisionChecker:
         data = self._base
         q_bodies = self.robot.body_configuration(q)
         pin.computeCollisions(
-            self._model, self._data, self._geometry, data, q_bodies, False
+            self._model, self._data, self.bodies, data, q_bodies, False
         )
         hits = [
-            int(self._pair_index[index])
+            int(self.pair_index[index])
             for index, result in enumerate(data.collisionResults)
             if result.isCollision()
         ]
@@ -202,7 +216,7 @@ class CollisionChecker:
         return min(candidates, key=len)[0] if candidates else _NO_PAIR
 
 
-def _guess_nothing(requests: Any) -> None:
+def guess_nothing(requests: Any) -> None:
     """Let checks begin from nothing that an earlier one has left.
 
     Its guess would change answers in the last digits, and saves no time that could be
@@ -213,23 +227,6 @@ def _guess_nothing(requests: Any) -> None:
         warnings.simplefilter("ignore", DeprecationWarning)
         for request in requests:
             request.enable_cached_gjk_guess = False
-
-
-def _margin_shares(
-    geometry: Any, motion: PairMotion, reach_m: FloatArray
-) -> FloatArray:
-    """Share of the robot's displacement that can bring each pair together.
-
-    A motion that moves no point further than d moves the bodies of a pair against
-    each other by at most ``d · max_j R[pair, j] / reach_j`` over the joints between
-    them; two neighbours at the wrist need not keep the distance that the camera needs
-    from the floor.
-    """
-    shares = []
-    for pair in geometry.collisionPairs:
-        joints, reach = motion.between(pair)
-        shares.append(float((reach[joints] / reach_m[joints]).max()))
-    return np.array(shares)
 
 
 def _with_convex_hulls(geometry: Any) -> Any:

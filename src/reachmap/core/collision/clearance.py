@@ -1,0 +1,124 @@
+"""How close bodies come on a path: the least distance, and between which two."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from reachmap._typing import FloatArray, IntArray
+from reachmap.core.collision.checker import CollisionChecker, guess_nothing
+
+TOLERANCE_M = 1e-3
+"""By which a clearance may be greater than the least there is anywhere on the path."""
+
+
+class ClearanceMeter:
+    """Measures the distances of the bodies that a checker checks.
+
+    A distance is that of the convex hulls where it is not the least so far, and that of
+    the bodies themselves where it might be: hulls are never further apart.
+
+    Parameters
+    ----------
+    checker : CollisionChecker
+    """
+
+    def __init__(self, checker: CollisionChecker) -> None:
+        self._checker = checker
+        self._model = checker.robot.body_model
+        self._data = self._model.createData()
+        self._bodies, self._hulls = checker.bodies, checker.hulls
+        self._bodies_data = self._bodies.createData()
+        self._hulls_data = self._hulls.createData()
+        for data in (self._bodies_data, self._hulls_data):
+            guess_nothing(data.distanceRequests)
+        pairs = self._bodies.collisionPairs
+        self._has_mesh = np.array([self._differs(pair) for pair in pairs], bool)
+
+    def of_path(self, path: FloatArray) -> tuple[float, int]:
+        """Least distance of two bodies on a path.
+
+        The path is halved until what lies between two configurations cannot be
+        closer, by the bound on how far a motion moves each pair against each other, so
+        that no place is narrower by more than a millimetre.
+
+        Parameters
+        ----------
+        path : array, shape (n, dof)
+            Straight motions between its points [rad].
+
+        Returns
+        -------
+        clearance_m : float
+            NaN where there are no pairs.
+        pair : int
+            Index into the checker's ``body_pairs``, -1 where there are none.
+        """
+        count = len(self._bodies.collisionPairs)
+        if count == 0:
+            return float("nan"), -1
+        self._least, self._pair = np.inf, -1
+        everything = np.arange(count)
+        nothing_known = np.full(count, -np.inf)
+        # The last way-point, at the grasp, is the narrowest as a rule.
+        ends = [self._distances(q, everything, nothing_known) for q in path[::-1]][::-1]
+        for k in range(len(path) - 1, 0, -1):
+            self._halve(path[k - 1], path[k], ends[k - 1], ends[k])
+        return float(self._least), int(self._checker.pair_index[self._pair])
+
+    def _halve(
+        self, q_from: FloatArray, q_to: FloatArray, d_from: FloatArray, d_to: FloatArray
+    ) -> None:
+        """Look at the middle of a motion, unless it cannot be narrower anywhere."""
+        waiting = [(q_from, q_to, d_from, d_to)]
+        while waiting:
+            a, b, d_a, d_b = waiting.pop()
+            # A pair that moves by r on the way is nowhere nearer than this.
+            moved = self._checker.pair_reach_m @ np.abs(b - a)
+            least = 0.5 * (d_a + d_b - moved)
+            near = np.flatnonzero(least < self._least - TOLERANCE_M)
+            if not len(near):
+                continue
+            middle = 0.5 * (a + b)
+            d_middle = self._distances(middle, near, least)
+            waiting += [(a, middle, d_a, d_middle), (middle, b, d_middle, d_b)]
+
+    def _distances(
+        self, q: FloatArray, pairs: IntArray, known: FloatArray
+    ) -> FloatArray:
+        """Distances of some pairs at q [m], lower bounds of the others."""
+        q_bodies = self._checker.robot.body_configuration(q)
+        pin.updateGeometryPlacements(
+            self._model, self._data, self._hulls, self._hulls_data, q_bodies
+        )
+        distance = known.copy()
+        for k in pairs.tolist():
+            distance[k] = self._measure(self._hulls, self._hulls_data, k)
+        closest = pairs[self._has_mesh[pairs] & (distance[pairs] < self._least)]
+        if len(closest):
+            pin.updateGeometryPlacements(
+                self._model, self._data, self._bodies, self._bodies_data, q_bodies
+            )
+        order = pairs[np.argsort(distance[pairs], kind="stable")].tolist()
+        for k in order:
+            if distance[k] >= self._least:
+                break
+            if self._has_mesh[k]:
+                exact = self._measure(self._bodies, self._bodies_data, k)
+                distance[k] = max(distance[k], exact)
+            if distance[k] < self._least:
+                self._least, self._pair = distance[k], k
+        return distance
+
+    def _measure(self, geometry: Any, data: Any, pair: int) -> float:
+        return float(pin.computeDistance(geometry, data, pair).min_distance)
+
+    def _differs(self, pair: Any) -> bool:
+        """Whether a body of the pair is more than its hull."""
+        return any(
+            type(self._bodies.geometryObjects[body].geometry)
+            is not type(self._hulls.geometryObjects[body].geometry)
+            for body in (pair.first, pair.second)
+        )
