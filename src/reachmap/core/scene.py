@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import logging
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -20,6 +21,9 @@ from reachmap.errors import SceneError
 
 if TYPE_CHECKING:
     from reachmap.cell.loading import LoadedCell
+
+
+logger = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -116,12 +120,16 @@ class Scene:
     def require_free_scan_configuration(self) -> None:
         """Refuse to work from a scan configuration that cannot be taken.
 
+        What is doubtful about the cell is logged as a warning.
+
         Raises
         ------
         SceneError
             It is outside joint limits, or two bodies touch, or the bin reaches into
             what stands around it; they are named.
         """
+        for warning in self.loaded.warnings:
+            logger.warning("%s", warning)
         problems = self.scan_problems()
         if problems:
             source = self.loaded.source

@@ -207,6 +207,8 @@ class _Attempt:
             The cell cannot even be loaded.
         """
         loaded = self._loaded()
+        warnings = (_without_label(line) for line in loaded.warnings)
+        self.notes += [line for line in warnings if line not in self._source.notes]
         try:
             arm = RobotModel.from_cell(loaded)
             Q = trial.as_written(arm, trial.random_configurations(arm))
@@ -226,8 +228,8 @@ class _Attempt:
                 starter_text(self.choices), label=LABEL, directory=self._folder
             )
         except CellError as error:
-            plain = [re.sub(rf"^{LABEL}:\d+:\d+: ", "", line) for line in error.lines]
-            raise CellError(f"{self._source.label}: {line}" for line in plain) from None
+            lines = map(_without_label, error.lines)
+            raise CellError(f"{self._source.label}: {line}" for line in lines) from None
         # An SRDF of our own is not on the disk yet.
         return replace(loaded, srdf=self.srdf) if self.srdf else loaded
 
@@ -350,3 +352,7 @@ def _srdf_text(name: str, pairs: list[tuple[str, str]]) -> str:
         for first, second in pairs
     ]
     return "\n".join([*lines, "</robot>", ""])
+
+
+def _without_label(line: str) -> str:
+    return re.sub(rf"^{LABEL}:\d+:\d+: ", "", line)

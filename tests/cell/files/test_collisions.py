@@ -11,6 +11,7 @@ from reachmap.cell.files.urdf import parse_urdf
 from reachmap.cell.model.shapes import sides
 from reachmap.core.collision.solids import SolidCell
 from reachmap.errors import CellError
+from tests.support.command_line import reachmap
 from tests.support.small_cells import joint, link, load, robot
 
 ARM = (joint("j1", "base", "l1"), link("base"))
@@ -81,6 +82,14 @@ def test_links_that_can_be_seen_but_not_collide_are_named(tmp_path: Path) -> Non
     loaded = load(tmp_path, every, "l2", ["j1", "j2"])
     assert "NOTHING OF THE ARM IS CHECKED" in loaded.warnings[0]
     assert "l2" in loaded.warnings[0]
+    answer = reachmap(tmp_path, "check", "cell.yaml")
+    assert "warning: " in answer.stdout
+    assert "NOTHING OF THE ARM IS CHECKED" in answer.stdout
+    made = reachmap(tmp_path, "new-cell", "arm.urdf", "-o", "n.yaml")
+    assert "note: NOTHING OF THE ARM IS CHECKED" in made.stderr
+    scan = ("bin-scan", "--cell", "cell.yaml", "--no-progress", "-j", "1")
+    scanned = reachmap(tmp_path, *scan, "-o", "b.h5")
+    assert "NOTHING OF THE ARM IS CHECKED" in scanned.stderr
     body = "bodies=[{name: b, attach_to: l2, shape: {box: [0.1, 0.1, 0.1]}}]"
     (warning,) = load(tmp_path, every, "l2", ["j1", "j2"], [body]).warnings
     assert "never checked: l2" in warning

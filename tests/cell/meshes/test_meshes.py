@@ -278,6 +278,35 @@ def test_obj_faces_count_from_either_end() -> None:
             read_mesh(data + face, ".obj")
 
 
+@pytest.mark.parametrize("order", ["<", ">"])
+@pytest.mark.parametrize("faces", [[[0, 1, 2], [0, 2, 3]], [[0, 1, 2, 3]],
+                                   [[0, 1, 2, 3], [0, 1, 2]], [[0, 1, 2], [0, 1, 2, 3]],
+                                   []])  # fmt: skip
+def test_binary_ply_faces_of_any_size(order: str, faces: list[list[int]]) -> None:
+    """All of one size are read at once, others one by one, to the same area."""
+    name = "little" if order == "<" else "big"
+    data = f"""ply
+format binary_{name}_endian 1.0
+element face {len(faces)}
+property list uchar ushort vertex_indices
+element vertex 4
+property float x
+property float y
+property float z
+end_header
+""".encode()
+    for face in faces:
+        data += struct.pack(f"{order}B{len(face)}H", len(face), *face)
+    for corner in ([0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]):
+        data += struct.pack(f"{order}3f", *corner)
+    if not faces:
+        with pytest.raises(MeshError, match="no triangles"):
+            read_mesh(data, ".ply")
+        return
+    expected = sum(len(face) - 2 for face in faces) / 2
+    assert area(read_mesh(data, ".ply")) == pytest.approx(expected)
+
+
 @pytest.mark.parametrize("index", [77777777, 3, -1])
 @pytest.mark.parametrize("kind", ["ascii", "binary_little_endian"])
 def test_ply_faces_may_not_name_missing_vertices(kind: str, index: int) -> None:

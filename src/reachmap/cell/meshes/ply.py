@@ -18,6 +18,7 @@ _TYPES = {
     "int": "i4", "int32": "i4", "uint": "u4", "uint32": "u4",
     "float": "f4", "float32": "f4", "double": "f8", "float64": "f8",
 }  # fmt: skip
+MAX_ROWS = 20_000_000
 _ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 
 
@@ -77,8 +78,8 @@ def _elements(lines: list[list[str]]) -> list[_Element]:
                 raise MeshError(f"unknown property of a PLY {elements[-1].name}")
             count_type = _TYPES[types[0]] if is_list else ""
             elements[-1].properties.append((words[-1], count_type, _TYPES[types[-1]]))
-    if any(element.count < 0 for element in elements):
-        raise MeshError("negative count in the PLY header")
+    if not all(0 <= element.count <= MAX_ROWS for element in elements):
+        raise MeshError(f"a count of the PLY header is not from 0 to {MAX_ROWS:,}")
     return elements
 
 
@@ -97,6 +98,9 @@ class _Binary:
 
     def lists(self, element: _Element, wanted: int) -> list[list[int]]:
         """The wanted list of each row."""
+        alike = self._lists_alike(element)
+        if alike is not None:
+            return alike if wanted == 0 else []
         found: list[list[int]] = []
         for _ in range(element.count):
             for k, (_, count_type, kind) in _each(element):
@@ -108,6 +112,25 @@ class _Binary:
                 if k == wanted:
                     found.append(values.tolist())
         return found
+
+    def _lists_alike(self, element: _Element) -> list[list[int]] | None:
+        """All rows at once where each is one list of the same length, as is usual."""
+        if len(element.properties) > 1 or not element.count:
+            return None
+        (_, count_type, kind), start = element.properties[0], self._at
+        length = int(self._take(np.dtype(self._order + count_type), 1)[0])
+        self._at = start
+        row = np.dtype(
+            [("n", self._order + count_type), ("v", self._order + kind, (length,))]
+        )
+        if length < 1 or start + element.count * row.itemsize > len(self._body):
+            return None
+        rows = np.frombuffer(self._body, row, count=element.count, offset=start)
+        if not (rows["n"] == length).all():
+            return None
+        self._at += element.count * row.itemsize
+        values: list[list[int]] = rows["v"].tolist()
+        return values
 
     def _take(self, dtype: np.dtype[Any], count: int) -> npt.NDArray[Any]:
         end = self._at + dtype.itemsize * count

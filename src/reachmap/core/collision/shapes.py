@@ -11,13 +11,22 @@ from scipy.spatial import ConvexHull, QhullError
 from reachmap._typing import FloatArray
 from reachmap.cell.model.shapes import Solid, TriangleMesh
 
+# A hundredth of what a safety margin usually is.
+FLAT_M = 1e-5
+
 
 def coal_shape(shape: Solid) -> Any:
     """Collision geometry of a shape; a mesh is a surface, with nothing inside."""
     if isinstance(shape, TriangleMesh):
+        vertices = shape.vertices
+        low, high = vertices.min(axis=0), vertices.max(axis=0)
+        if (high - low).min() < FLAT_M:
+            # The broadphase passes over boxes without volume: two corners that no
+            # triangle uses give this one some.
+            vertices = np.vstack([vertices, low - FLAT_M, high + FLAT_M])
         surface = coal.BVHModelOBBRSS()
-        surface.beginModel(len(shape.triangles), len(shape.vertices))
-        surface.addVertices(np.ascontiguousarray(shape.vertices, float))
+        surface.beginModel(len(shape.triangles), len(vertices))
+        surface.addVertices(np.ascontiguousarray(vertices, float))
         surface.addTriangles(np.ascontiguousarray(shape.triangles, np.int64))
         surface.endModel()
         return surface
