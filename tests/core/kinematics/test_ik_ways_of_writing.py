@@ -142,3 +142,14 @@ def test_what_eaik_cannot_take_goes_to_another_solver(half: float) -> None:
     found, frame = kinematics.solve_many(T)
     assert len(np.unique(frame)) == len(Q)
     assert misses(arm, found, T[frame]).max() < 1e-6 + kinematics.tolerance
+
+
+def test_a_straight_approach_of_rounded_five_axes_is_followed() -> None:
+    """What may miss a pose by rounding may do so along a path, too."""
+    kinematics = five_axes(1.5708)
+    assert "may be missed" in kinematics.approximation
+    T = np.tile(np.diag([1.0, -1.0, -1.0, 1.0]), (30, 1, 1))
+    T[:, :3, 3] = np.linspace([0.4, 0.1, 0.1], [0.4, 0.1, 0.0], 30)
+    path = kinematics.follow(kinematics.solve(T[0], windings=False)[0], T)
+    assert path is not None
+    assert misses(kinematics.robot, path, T).max() < 2 * kinematics.tolerance

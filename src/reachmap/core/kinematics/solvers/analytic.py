@@ -104,6 +104,7 @@ class AnalyticSolver:
         return (
             f"closed form of the {arm}, {how}; a self-test found "
             f"{self._form.score} of {SELF_TESTS} configurations again"
+            f"{self._arm.rounding_note}"
         )
 
     def branches(self, T: FloatArray) -> Rows:

@@ -48,6 +48,16 @@ class Arm:
             return ACCEPTED
         return max(ACCEPTED, rounding(self.chain))
 
+    @property
+    def rounding_note(self) -> str:
+        """Words on poses that are missed as angles are rounded; "" if they are not."""
+        if self.tolerance <= ACCEPTED:
+            return ""
+        return (
+            f"; a pose may be missed by {self.tolerance:.0e} m and rad, as angles of "
+            "the URDF are rounded"
+        )
+
 
 class BranchSolver(Protocol):
     """A way to solve inverse kinematics, made for one arm."""

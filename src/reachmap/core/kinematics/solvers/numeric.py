@@ -78,10 +78,12 @@ class NumericSolver:
     def approximation(self) -> str:
         """How solutions are sought."""
         if self._table is None:
-            return f"least squares from {self._restarts} starts"
+            return (
+                f"least squares from {self._restarts} starts{self._arm.rounding_note}"
+            )
         return (
             f"least squares from up to {self._count} starts: the nearest of "
-            f"{len(self._table)} configurations"
+            f"{len(self._table)} configurations{self._arm.rounding_note}"
         )
 
     @property
