@@ -101,8 +101,7 @@ def mapped(loaded: LoadedCell, compared: list[Entry]) -> list[Evaluation]:
     with open_evaluator(
         loaded,
         is_open,
-        workers=WORKERS,
-        executor="processes",
+        QUIET,
         progress=Progress("bench", quiet=True),
     ) as evaluator:
         return evaluator.evaluate(

@@ -15,9 +15,18 @@ import numpy as np
 
 from reachmap.cell.loading import read_cell
 from reachmap.core.scene import Scene
+from reachmap.runtime.job import Job
+from reachmap.runtime.options import RunOptions
 from reachmap.runtime.progress import Progress
+from reachmap.runtime.run import run
 from reachmap.sampling.frames import workspace_frames
-from reachmap.scans.ik_survey import SurveyContext, run_survey
+from reachmap.scans.ik_survey import (
+    Survey,
+    SurveyContext,
+    join_surveys,
+    prepare_survey,
+    survey_unit,
+)
 from reachmap.scans.workspace_per_frame import plan_frames
 from reachmap.scans.workspace_roadmap import connect_survey, results_of_connection
 
@@ -40,12 +49,14 @@ def scan(overrides: Sequence[str], workers: int) -> tuple[int, int, dict[str, fl
         approach_m=0.0,
     )
     begin = time.perf_counter()
-    survey = run_survey(
-        context,
-        workers=workers,
-        executor="processes",
-        progress=Progress("", quiet=True),
+    job = Job(function=survey_unit, prepare=prepare_survey, context=context)
+    payloads = run(
+        job,
+        context.blocks(),
+        RunOptions(workers=workers),
+        Progress("", quiet=True),
     )
+    survey = join_surveys([Survey(**payload) for payload in payloads])
     middle = time.perf_counter()
     connection = connect_survey(scene, survey, seed=loaded.cell.seed)
     results = results_of_connection(survey, connection)

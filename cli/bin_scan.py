@@ -55,8 +55,9 @@ def command(
 
     Example: reachmap bin-scan placement.h5 --set bin_scan.repeats=1
     """
+    from reachmap.runtime.options import RunOptions
     from reachmap.tools.bin_scan import bin_scan, estimate_bin_scan, summary_of_bin
-    from reachmap.tools.options import RunOptions, written_by
+    from reachmap.tools.options import written_by
 
     check_scan_options(shard, executor, dry_run=dry_run)
     if placement is not None:

@@ -37,6 +37,7 @@ import click
 from click.core import ParameterSource
 
 from reachmap.cli.failures import RunState
+from reachmap.runtime.options import available_cores
 
 Decorated = TypeVar("Decorated", bound=Callable[..., Any])
 Decorator = Callable[[Decorated], Decorated]
@@ -71,13 +72,6 @@ def parse_shard(
         if 1 <= index <= count:
             return index, count
     raise click.BadParameter(f"{value!r} is not I/N with 1 <= I <= N, such as 3/8.")
-
-
-def available_cores() -> int:
-    """Cores this process may use, which in a container is fewer than there are."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 def _option(*declarations: str, **settings: Any) -> Decorator[Any]:

@@ -157,7 +157,7 @@ def command(
             "rule", "fixed", "region", "heights", because="--bin-pose is not searched"
         )
     check_workers(executor)
-    from reachmap.tools.options import RunOptions
+    from reachmap.runtime.options import RunOptions
     from reachmap.tools.place_bin import PlacementChoice, place_bin, placement_facts
 
     limits = {} if region is None else {"x": region[:2], "y": region[2:]}

@@ -102,7 +102,7 @@ def command(
     options.check_workers(executor)
     from reachmap.cli.text.validate import validation_text
     from reachmap.ranking.lookup.settings import CostBasis, RankSettings
-    from reachmap.tools.options import RunOptions
+    from reachmap.runtime.options import RunOptions
     from reachmap.tools.rank import ListFormat
     from reachmap.tools.validate import PickOptions, validate
 

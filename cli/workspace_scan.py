@@ -58,7 +58,8 @@ def command(
     Example: reachmap workspace-scan ur5-eye-in-hand --seed 7
     """
     check_scan_options(shard, executor, dry_run=dry_run)
-    from reachmap.tools.options import RunOptions, written_by
+    from reachmap.runtime.options import RunOptions
+    from reachmap.tools.options import written_by
     from reachmap.tools.workspace_scan import (
         estimate_workspace_scan,
         summary_of_workspace,

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from reachmap.ranking.lookup.order import Ranking
     from reachmap.ranking.lookup.ranker import Ranker
     from reachmap.ranking.lookup.settings import RankSettings
+    from reachmap.runtime.options import RunOptions
     from reachmap.tools.bin_scan import bin_scan
     from reachmap.tools.check import check
     from reachmap.tools.compare import compare
@@ -30,7 +31,6 @@ if TYPE_CHECKING:
     from reachmap.tools.info import info
     from reachmap.tools.merge import merge
     from reachmap.tools.new_cell import new_cell
-    from reachmap.tools.options import RunOptions
     from reachmap.tools.place_bin import place_bin
     from reachmap.tools.rank import rank
     from reachmap.tools.validate import validate
@@ -47,7 +47,7 @@ _HOMES: Final[dict[str, str]] = {
     "Ranker": "ranking.lookup.ranker",
     "Ranking": "ranking.lookup.order",
     "ReachmapError": "errors",
-    "RunOptions": "tools.options",
+    "RunOptions": "runtime.options",
     "Scene": "core.scene",
     "Status": "maps.records",
     "WorkspaceMap": "maps.records",

@@ -54,7 +54,7 @@ HOMES = {
 # Never: they run what a file says, or hide what they import.
 BANNED_MODULES = {"pickle", "marshal", "shelve", "dill", "cloudpickle", "yaml", "imp"}
 # Messages between this program's own processes; no file is ever unpickled.
-PICKLES = {"reachmap.runtime.workers.tasks", "reachmap.maps.bytes.isolation"}
+PICKLES = {"reachmap.maps.bytes.isolation"}
 BANNED_CALLS = {"eval", "exec", "print", "breakpoint"}
 
 

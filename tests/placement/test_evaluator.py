@@ -1,23 +1,18 @@
-"""Scores on workers: numbers of units, what is remembered, and the same by hand."""
+"""Scores on workers: what is remembered, and the same by hand."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from reachmap.cell.loading import read_cell
 from reachmap.core.robot.model import RobotModel
 from reachmap.core.scene import Scene
 from reachmap.geometry import yaw_transform
-from reachmap.placement.mapped.evaluator import (
-    numbers_of_unit,
-    open_evaluator,
-    unit_of_numbers,
-)
+from reachmap.placement.mapped.evaluator import open_evaluator
 from reachmap.placement.mapped.imaging import UNSEEN
 from reachmap.placement.mapped.sample import frames_in_bin, open_frames
+from reachmap.runtime.options import RunOptions
 from reachmap.runtime.progress import Progress
 
 # Six points, all around; nothing of the approach but the branches of the kinematics.
@@ -26,20 +21,12 @@ EVERY = (3, 2, 1)
 POSE = (0.45, 0.05, 0.0, 1.3)
 
 
-@given(numbers=st.lists(st.floats(allow_nan=False), min_size=1, max_size=20))
-def test_units_carry_numbers_bit_for_bit(numbers):
-    """Numbers come back as they were, signs of zero and infinities included."""
-    back = numbers_of_unit(unit_of_numbers(numbers))
-    assert np.array(back).tobytes() == np.array(numbers, float).tobytes()
-
-
 def evaluator_of(loaded, workers=1):
     """An evaluator in this process, or with workers."""
     return open_evaluator(
         loaded,
         open_frames(RobotModel.from_cell(loaded), loaded),
-        workers=workers,
-        executor="processes",
+        RunOptions(workers=workers),
         progress=Progress("", quiet=True),
     )
 

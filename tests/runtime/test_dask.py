@@ -14,9 +14,10 @@ import psutil
 import pytest
 
 from reachmap.errors import MissingExtraError
-from reachmap.runtime.journal.entries import read_journal
-from reachmap.runtime.journal.journal import journal_path
+from reachmap.runtime.journal import read_store
+from reachmap.runtime.options import RunOptions
 from reachmap.runtime.run import run_scan
+from reachmap.runtime.store import store_path
 from tests.support import toy_work
 from tests.support.toy_work import expected
 
@@ -45,8 +46,8 @@ def wait_for_units(output, count, process):
     """Wait until the journal holds some units."""
     deadline = time.monotonic() + 120
     while time.monotonic() < deadline and process.poll() is None:
-        journal = journal_path(output)
-        if journal.exists() and journal.read_bytes().count(b"\n") > count:
+        journal = store_path(output)
+        if journal.exists() and journal.read_bytes().count(b"\n\n") > count + 1:
             return
         time.sleep(0.02)
     pytest.fail(f"no {count} units: {process.communicate()}")
@@ -90,7 +91,10 @@ def test_without_dask_the_extra_is_named(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(MissingExtraError, match=r"reachmap-cells\[dask\]"):
         run_scan(
-            toy_work.toy_work(), output=tmp_path / "out.json", executor="dask:local"
+            toy_work.toy_work(),
+            output=tmp_path / "out.json",
+            options=RunOptions(executor="dask:local"),
+            label="toy",
         )
 
 
@@ -111,7 +115,7 @@ def test_a_worker_of_a_local_cluster_is_killed(tmp_path):
     assert code == 0, err
     assert "Warning" not in err
     assert json.loads(output.read_text()) == expected()
-    assert not journal_path(output).exists()
+    assert not store_path(output).exists()
 
 
 @pytest.mark.slow
@@ -148,9 +152,11 @@ def test_a_scheduler_that_dies(tmp_path):
         code, err = finish(process)
     assert code == 3, err
     assert "Traceback" not in err
-    with read_journal(journal_path(output)) as entries:
-        assert len(entries.results) >= 3
-    outcome = run_scan(toy_work.toy_work(), output=output, workers=1)
+    with read_store(store_path(output)) as entries:
+        assert len(entries.results()) >= 3
+    outcome = run_scan(
+        toy_work.toy_work(), output=output, options=RunOptions(), label="toy"
+    )
     assert outcome.resumed >= 3
     assert json.loads(output.read_text()) == expected()
 

@@ -16,8 +16,8 @@ from pathlib import Path
 import psutil
 import pytest
 
-from reachmap.runtime.journal.entries import read_journal
-from reachmap.runtime.journal.journal import journal_path
+from reachmap.runtime.journal import read_store
+from reachmap.runtime.store import store_path
 from tests.support import toy_work
 from tests.support.toy_work import expected
 
@@ -66,10 +66,10 @@ def finish(output, *options, **toy):
 
 def wait_for_units(output, count, process):
     """Wait until the journal holds some units."""
-    journal = journal_path(output)
+    journal = store_path(output)
     deadline = time.monotonic() + 60
     while time.monotonic() < deadline and process.poll() is None:
-        if journal.exists() and journal.read_bytes().count(b"\n") > count:
+        if journal.exists() and journal.read_bytes().count(b"\n\n") > count + 1:
             return
         time.sleep(0.01)
     pytest.fail(f"no {count} units: {process.communicate()}")
@@ -108,7 +108,7 @@ def wait_a_while(output, process, rng):
 def size(output):
     """Length of the journal; a toy's line has about 300 bytes."""
     try:
-        return journal_path(output).stat().st_size
+        return store_path(output).stat().st_size
     except FileNotFoundError:
         return 0
 
@@ -208,10 +208,10 @@ def test_no_room_left(tmp_path):
     assert "File too large" in last
     assert "units are safe there" in last
     assert "Traceback" not in err
-    with read_journal(journal_path(output)) as entries:
-        kept = len(entries.results)
+    with read_store(store_path(output)) as entries:
+        kept = len(entries.results())
         assert (kept > 0, entries.damaged) == (True, 0)
-    assert journal_path(output).stat().st_size <= 6000
+    assert store_path(output).stat().st_size <= 6000
     code, counts, err = finish(output, "-j", "1")
     assert (code, counts) == (0, [str(40 - kept), str(kept)]), err
     assert json.loads(output.read_text()) == expected()

@@ -5,6 +5,8 @@ import multiprocessing
 import os
 import signal
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from contextlib import contextmanager, suppress
+from dataclasses import replace
 
 import pytest
 
@@ -16,12 +18,15 @@ from reachmap.errors import (
     SceneError,
     SettingsError,
 )
+from reachmap.maps import RunClock
 from reachmap.maps.records import RunInfo, Status
-from reachmap.runtime.journal.entries import read_journal
-from reachmap.runtime.journal.journal import journal_path
+from reachmap.runtime.job import Job
+from reachmap.runtime.journal import read_store
+from reachmap.runtime.options import RunOptions
 from reachmap.runtime.results import Results, preview
 from reachmap.runtime.run import run_scan, run_units
 from reachmap.runtime.signals import STOP_SIGNALS
+from reachmap.runtime.store import store_path
 from tests.support import toy_work
 from tests.support.toy_work import Toy, expected
 
@@ -34,7 +39,12 @@ def output(tmp_path):
 
 def run(output, toy=None, **settings):
     """Run a toy scan and read the artefact."""
-    outcome = run_scan(toy_work.toy_work(toy), output=output, **settings)
+    outcome = run_scan(
+        toy_work.toy_work(toy),
+        output=output,
+        options=RunOptions(**settings),
+        label="toy",
+    )
     return outcome, json.loads(output.read_text())
 
 
@@ -44,7 +54,7 @@ def test_the_artefact_is_what_the_function_says(output, workers):
     outcome, artefact = run(output, workers=workers)
     assert artefact == expected()
     assert (outcome.computed, outcome.resumed, outcome.path) == (40, 0, output)
-    assert not journal_path(output).exists()
+    assert not store_path(output).exists()
     assert isinstance(outcome.run, RunInfo)
     assert outcome.run.workers == workers
     assert outcome.run.cpu_s["units"] >= 0
@@ -58,12 +68,12 @@ def test_a_buggy_unit_is_recorded_and_tried_again(output, workers, caplog):
         run(output, toy, workers=workers)
     assert caught.value.lines[1] == "unit 7: ZeroDivisionError: unit 7 divides by zero"
     assert json.loads(output.read_text()) == expected(failed=(7, 39))
-    with read_journal(journal_path(output)) as entries:
-        assert 'raise ZeroDivisionError(f"unit' in entries.error(39)
+    with read_store(store_path(output)) as entries:
+        assert 'raise ZeroDivisionError(f"unit' in entries.failed()[39]
     outcome, artefact = run(output, workers=workers)
     assert artefact == expected()
     assert (outcome.computed, outcome.resumed) == (2, 38)
-    assert not journal_path(output).exists()
+    assert not store_path(output).exists()
 
 
 @pytest.mark.parametrize("workers", [1, 2])
@@ -90,7 +100,7 @@ def test_a_scene_that_cannot_be_built_ends_the_run(output, toy, error, said):
 
 def test_workers_that_die_while_preparing_end_the_run(output, monkeypatch):
     """A scene that kills its process is not retried for every unit."""
-    monkeypatch.setattr("reachmap.runtime.workers.crew.FAILED_STARTS", 3)
+    monkeypatch.setattr("reachmap.runtime.pool.FAILED_STARTS", 3)
     with pytest.raises(EngineError, match="died 3 times before their first unit"):
         run(output, Toy(prepare="killed"), workers=2)
 
@@ -112,7 +122,7 @@ def test_an_existing_artefact_is_not_replaced_unasked(output):
     with pytest.raises(OutputError, match="--overwrite"):
         run(output, Toy(seed=2))
     assert output.read_bytes() == before
-    assert not journal_path(output).exists()
+    assert not store_path(output).exists()
     assert run(output, Toy(seed=2), overwrite=True)[1] == expected(seed=2)
 
 
@@ -131,7 +141,7 @@ def test_other_package_versions_do_not_resume(output, monkeypatch):
     """Half a map from one planner version and half from the next is no map."""
     with pytest.raises(SceneError, match="unit 9"):
         run(output, Toy(wrong=(9,)))
-    monkeypatch.setattr("reachmap.runtime.workers.tasks.__version__", "99.0")
+    monkeypatch.setattr("reachmap.runtime.job.__version__", "99.0")
     with pytest.raises(MapFileError, match=r'packages.reachmap "[\d.]+" → "99.0"'):
         run(output)
 
@@ -187,7 +197,17 @@ def test_signal_handlers_and_environment_are_given_back(output):
 
 def test_an_unknown_executor_is_refused(output):
     """The message lists what there is; nothing is created."""
-    for name in ("threads", "dask", "dask:", "dask:somewhere", "dask:http://x"):
+    for name in (
+        "threads",
+        "dask",
+        "dask:",
+        "dask:somewhere",
+        "dask:http://x:1",
+        "dask:tcp://",
+        "dask:tcp://host",
+        "dask:tcp://:1",
+        "dask:tcp://host:99999",
+    ):
         with pytest.raises(SettingsError, match="expected processes, dask:local"):
             run(output, executor=name)
     assert not list(output.parent.iterdir())
@@ -197,7 +217,7 @@ def test_a_preview_shows_what_is_there(output):
     """A journal under way reads as an artefact with the rest not attempted."""
     with pytest.raises(SceneError, match="unit 9"):
         run(output, Toy(wrong=(9,)))
-    rows = preview(journal_path(output))["rows"]
+    rows = preview(store_path(output))["rows"]
     assert rows[:9] == expected()["rows"][:9]
     blank = toy_work.blank({}, 9, Status.NOT_ATTEMPTED)
     assert rows[9] == toy_work.bits(blank)
@@ -205,7 +225,13 @@ def test_a_preview_shows_what_is_there(output):
 
 def test_results_are_a_sequence(output):
     """Payloads can be indexed, sliced, counted and run through more than once."""
-    with run_units(toy_work.toy_work(), output=output) as results:
+    with run_units(
+        toy_work.toy_work(),
+        output=output,
+        options=RunOptions(),
+        label="toy",
+        clock=RunClock(),
+    ) as (results, _):
         assert isinstance(results, Results)
         assert len(results) == results.done == 40
         assert [one["unit"] for one in results] == list(range(40))
@@ -213,26 +239,78 @@ def test_results_are_a_sequence(output):
         assert (results.missing, dict(results.failed)) == ((), {})
         with pytest.raises(IndexError, match="unit 40 of 40"):
             results[40]
-    assert not journal_path(output).exists()
+    assert not store_path(output).exists()
 
 
-def test_a_payload_of_another_kind_is_an_error_of_the_file(output):
-    """A journal with the right sums and the wrong contents is not believed."""
-    work = toy_work.toy_work()
-    with pytest.raises(RuntimeError, match="stop"), run_units(work, output=output):
-        raise RuntimeError("stop")
+def test_an_output_that_appears_meanwhile_is_kept(output):
+    """What somebody else put there during the run is not replaced; nothing is lost."""
+    with (
+        pytest.raises(OutputError, match="40 of 40 units are safe in"),
+        _somebody_writes(output),
+    ):
+        run(output)
+    assert output.read_text() == "precious"
+    outcome, artefact = run(output, overwrite=True)
+    assert (outcome.resumed, artefact) == (40, expected())
 
-    def refuse(data):
-        raise KeyError("status")
 
-    strict = type(work.kind)(
-        name="toy",
-        blank=toy_work.blank,
-        assemble=toy_work.assemble,
-        write=toy_work.write,
-        decode=refuse,
-    )
-    with read_journal(journal_path(output)) as entries:
-        results = Results(strict, [entries])
-        with pytest.raises(MapFileError, match="unit 0 of the journal is not a result"):
-            results[0]
+@contextmanager
+def _somebody_writes(output):
+    before = toy_work.KIND
+
+    def assemble(document, payloads, *, run):
+        output.write_text("precious")
+        return toy_work.assemble(document, payloads, run=run)
+
+    toy_work.KIND = replace(before, assemble=assemble)
+    try:
+        yield
+    finally:
+        toy_work.KIND = before
+
+
+def test_an_empty_store_is_no_licence_to_overwrite(output):
+    """Only what this very work has published may be replaced unasked."""
+    output.write_text("precious")
+    store_path(output).touch()
+    with pytest.raises(OutputError, match="--overwrite"):
+        run(output)
+    assert output.read_text() == "precious"
+
+
+def test_an_artefact_with_errors_that_was_changed_is_kept(output):
+    """The same command completes its own artefact, and no other under that name."""
+    with pytest.raises(IncompleteError):
+        run(output, Toy(buggy=(7,)))
+    output.write_text("precious")
+    with pytest.raises(OutputError, match="--overwrite"):
+        run(output)
+    assert output.read_text() == "precious"
+    assert run(output, overwrite=True)[1] == expected()
+
+
+def test_stages_are_kept_too(output):
+    """What comes before the units is computed once, whatever interrupts the rest."""
+    calls = []
+
+    def staged(stages, toy):
+        shape = stages.run(
+            "survey", Job(function=double, context=None), [(1, 2), (3, 4)]
+        )
+        total = stages.once("sum", lambda progress: calls.append(1) or sum(shape))
+        assert total == 20
+        return Job(function=toy_work.compute, context=toy, prepare=toy_work.prepare)
+
+    def work(toy):
+        return replace(toy_work.toy_work(toy), job=lambda stages: staged(stages, toy))
+
+    for toy in (Toy(wrong=(5,)), Toy(wrong=(9,)), Toy()):
+        with suppress(SceneError):
+            run_scan(work(toy), output=output, options=RunOptions(), label="toy")
+    assert json.loads(output.read_text()) == expected()
+    assert calls == [1]
+
+
+def double(context, unit):
+    """Twice the sum of a unit."""
+    return 2 * sum(unit)

@@ -13,9 +13,10 @@ from reachmap.errors import (
     SceneError,
     SettingsError,
 )
-from reachmap.runtime.journal.journal import journal_path
 from reachmap.runtime.merge import merge_journals
+from reachmap.runtime.options import RunOptions
 from reachmap.runtime.run import run_scan
+from reachmap.runtime.store import store_path
 from tests.support import toy_work
 from tests.support.toy_work import Toy, expected
 
@@ -28,8 +29,9 @@ def output(tmp_path):
 
 def shard(output, index, count, toy=None, **settings):
     """Run one shard; returns its journal."""
+    options = RunOptions(shard=(index, count), **settings)
     outcome = run_scan(
-        toy_work.toy_work(toy), output=output, shard=(index, count), **settings
+        toy_work.toy_work(toy), output=output, options=options, label="toy"
     )
     assert outcome.artefact is None
     assert not output.exists()
@@ -63,9 +65,14 @@ def test_more_shards_than_units(output):
 def test_a_whole_journal_merges_alone(output):
     """The journal of an ordinary run is a shard 1/1."""
     with pytest.raises(SceneError, match="unit 39"):
-        run_scan(toy_work.toy_work(wrong=(39,)), output=output)
+        run_scan(
+            toy_work.toy_work(wrong=(39,)),
+            output=output,
+            options=RunOptions(),
+            label="",
+        )
     with pytest.raises(IncompleteError, match=r"1 of 40 units are missing \(39\)"):
-        merge_journals([journal_path(output)], output=output)
+        merge_journals([store_path(output)], output=output)
 
 
 def test_a_shard_resumes_like_any_run(output):
@@ -73,7 +80,7 @@ def test_a_shard_resumes_like_any_run(output):
     with pytest.raises(SceneError, match="unit 21"):
         shard(output, 2, 4, Toy(wrong=(21,)))
     journal = shard(output, 2, 4)
-    other = journal_path(output, (3, 4))
+    other = store_path(output, (3, 4))
     journal.rename(other)
     with pytest.raises(MapFileError, match=r"shard \(2, 4\) → \(3, 4\)"):
         shard(output, 3, 4)
@@ -110,7 +117,7 @@ def test_failed_units_are_published_as_errors(output):
     """A merge finishes with what there is, and says what is wrong with it."""
     with pytest.raises(IncompleteError, match="1 of 40 units failed"):
         shard(output, 1, 2, Toy(buggy=(4,)))
-    journals = [journal_path(output, (1, 2)), shard(output, 2, 2)]
+    journals = [store_path(output, (1, 2)), shard(output, 2, 2)]
     with pytest.raises(IncompleteError, match="unit 4: ZeroDivisionError"):
         merge_journals(journals, output=output)
     assert json.loads(output.read_text()) == expected(failed=(4,))

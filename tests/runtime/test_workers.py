@@ -5,7 +5,7 @@ from concurrent.futures import BrokenExecutor
 
 import pytest
 
-from reachmap.runtime.workers.processes import WorkerProcess
+from reachmap.runtime.executors import WorkerProcess
 
 LARGE = b"x" * 2**22  # more than a pipe takes while nobody reads
 

@@ -11,13 +11,18 @@ from reachmap.scans import bin_scan
 POISONED = 1
 
 
-def plan_unit(state, unit):
+def plan_unit(state, grasps):
     """Plan as the real scan does, except for the poisoned unit."""
-    if unit == POISONED:
+    if grasps.start == POISONED * bin_scan.GRASPS_PER_UNIT:
         os.kill(os.getpid(), signal.SIGKILL)
-    return bin_scan.plan_unit(state, unit)
+    return bin_scan.plan_unit(state, grasps)
 
 
 def bin_work(*arguments):
     """Work of the real scan with the poisoned unit in it."""
-    return dataclasses.replace(bin_scan.bin_work(*arguments), function=plan_unit)
+    work = bin_scan.bin_work(*arguments)
+
+    def job(stages):
+        return dataclasses.replace(work.job(stages), function=plan_unit)
+
+    return dataclasses.replace(work, job=job)

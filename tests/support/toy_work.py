@@ -19,7 +19,9 @@ from pathlib import Path
 import numpy as np
 
 from reachmap.errors import ReachmapError, SceneError
-from reachmap.runtime.work import KINDS, Kind, Work
+from reachmap.maps import publish
+from reachmap.runtime.job import KINDS, Job, Kind, Work
+from reachmap.runtime.options import RunOptions
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -114,9 +116,7 @@ def bits(payload):
 
 def write(path, artefact, *, overwrite=False):
     """Publish the text."""
-    temporary = path.with_name(f"{path.name}.{os.getpid()}.tmp")
-    temporary.write_text(json.dumps(artefact))
-    temporary.replace(path)
+    publish(path, [json.dumps(artefact).encode()], overwrite=overwrite)
 
 
 KIND = Kind(name="toy", blank=blank, assemble=assemble, write=write)
@@ -126,15 +126,13 @@ KINDS["toy"] = "tests.support.toy_work:KIND"
 def toy_work(toy=None, **changes):
     """The work of a toy."""
     toy = dataclasses.replace(toy or Toy(), **changes)
+    job = Job(function=compute, prepare=prepare, context=toy, tally=tally)
     return Work(
         kind=KIND,
-        units=toy.units,
-        function=compute,
-        prepare=prepare,
-        context=toy,
+        units=range(toy.units),
+        job=lambda stages: job,
         settings={"seed": toy.seed, "grid": {"units": [toy.units, 1]}},
         document={"title": "a toy"},
-        tally=tally,
         frames=5 * toy.units,
     )
 
@@ -154,7 +152,6 @@ def expected(toy=None, *, failed=(), **changes):
 
 def main():
     """Run a toy as a command."""
-    from reachmap.runtime.progress import Progress
     from reachmap.runtime.run import run_scan
 
     parser = argparse.ArgumentParser()
@@ -177,7 +174,12 @@ def main():
     logging.getLogger("reachmap").setLevel(logging.INFO)
     logging.getLogger("reachmap").addHandler(logging.StreamHandler())
     try:
-        outcome = run_scan(toy_work(toy), progress=Progress("toy"), **options)
+        outcome = run_scan(
+            toy_work(toy),
+            output=options.pop("output"),
+            options=RunOptions(quiet=False, **options),
+            label="toy",
+        )
     except ReachmapError as error:
         print("\n".join(error.lines), file=sys.stderr)
         return error.exit_code

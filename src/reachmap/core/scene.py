@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import logging
+from collections import deque
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -101,6 +102,27 @@ class Scene:
             with_bin=with_bin,
         )
 
+    @classmethod
+    def shared(cls, loaded: LoadedCell, *, with_bin: bool = True) -> Scene:
+        """Scene of a cell, built once per process as long as the cell is the same.
+
+        Parameters
+        ----------
+        loaded : LoadedCell
+        with_bin : bool
+
+        Raises
+        ------
+        SceneError
+            As :meth:`build` raises it.
+        """
+        for scene in _shared:
+            if scene.with_bin == with_bin and scene.loaded == loaded:
+                return scene
+        scene = cls.build(loaded, with_bin=with_bin)
+        _shared.appendleft(scene)
+        return scene
+
     def with_bin_of(self, loaded: LoadedCell) -> Scene:
         """Move the bin to where a version of the cell has it.
 
@@ -169,3 +191,6 @@ class Scene:
             shares = np.arange(1, steps + 1)[:, None] / steps
             pieces.append(q_from + shares * (q_to - q_from))
         return self.kinematics.forward_many(np.vstack(pieces))[:, :3, 3]
+
+
+_shared: deque[Scene] = deque(maxlen=2)

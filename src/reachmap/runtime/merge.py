@@ -8,11 +8,10 @@ from pathlib import Path
 
 from reachmap.errors import IncompleteError, MapFileError, SettingsError
 from reachmap.maps import RunClock, check_output
-from reachmap.runtime.journal.entries import Entries, read_journal
-from reachmap.runtime.journal.format import differences
+from reachmap.runtime.job import kind_named
+from reachmap.runtime.journal import Entries, differences, read_store
 from reachmap.runtime.results import Results, units_text
 from reachmap.runtime.run import Outcome
-from reachmap.runtime.work import kind_named
 
 
 def merge_journals(
@@ -46,7 +45,7 @@ def merge_journals(
     check_output(output, overwrite=overwrite)
     clock = RunClock(workers=len(paths))
     with ExitStack() as stack:
-        journals = {path: stack.enter_context(read_journal(path)) for path in paths}
+        journals = {path: stack.enter_context(read_store(path)) for path in paths}
         if len(journals) < len(paths):
             raise SettingsError("a journal is named twice")
         check_together(journals)
@@ -80,12 +79,12 @@ def check_together(journals: dict[Path, Entries]) -> None:
             )
     owner: dict[int, Path] = {}
     for path, entries in journals.items():
-        if twice := sorted(owner.keys() & entries.results.keys()):
+        if twice := sorted(owner.keys() & entries.results().keys()):
             raise MapFileError(
                 f"{path} and {owner[twice[0]]} both hold units {units_text(twice)}: "
                 "leave one of them out"
             )
-        owner.update(dict.fromkeys(entries.results, path))
+        owner.update(dict.fromkeys(entries.results(), path))
 
 
 def _check_complete(results: Results, journals: Sequence[Entries]) -> None:

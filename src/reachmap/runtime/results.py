@@ -1,4 +1,4 @@
-"""The payloads of a run, read from its journals as they are asked for."""
+"""The payloads of a run, read from its stores as they are asked for."""
 
 from __future__ import annotations
 
@@ -6,18 +6,18 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from reachmap.errors import IncompleteError, MapFileError
+from reachmap.errors import IncompleteError
 from reachmap.maps.records import RunInfo, Status
 from reachmap.runtime.encoding import Json
-from reachmap.runtime.journal.entries import Entries, read_journal
-from reachmap.runtime.work import Kind, kind_named
+from reachmap.runtime.job import Kind, kind_named
+from reachmap.runtime.journal import Entries, read_store
 
 SHOWN_FAILURES = 5
 SHOWN_UNITS = 6
 
 
 class Results(Sequence[Any]):
-    """Payloads in unit order, whatever order and journal they were recorded in.
+    """Payloads in unit order, whatever order and store they were recorded in.
 
     A unit that failed has the payload ``kind.blank(…, Status.ERROR)``, one that was
     not done yet ``kind.blank(…, Status.NOT_ATTEMPTED)``.
@@ -25,10 +25,8 @@ class Results(Sequence[Any]):
     Parameters
     ----------
     kind : Kind
-    journals : sequence of Entries
+    stores : sequence of Entries
         At least one; all of the same work.
-    resumed : int
-        Units that an earlier run did.
 
     Attributes
     ----------
@@ -44,19 +42,17 @@ class Results(Sequence[Any]):
         CPU time of all units together, over all resumes and shards [s].
     """
 
-    def __init__(
-        self, kind: Kind, journals: Sequence[Entries], *, resumed: int = 0
-    ) -> None:
-        header = journals[0].header
-        self.resumed = resumed
+    def __init__(self, kind: Kind, stores: Sequence[Entries]) -> None:
+        header = stores[0].header
         self._kind = kind
         self._units = header.units
-        self._home = {unit: entries for entries in journals for unit in entries.results}
+        results = [(entries, entries.results()) for entries in stores]
+        self._home = {unit: entries for entries, units in results for unit in units}
         self.document: Mapping[str, Json] = header.document
         self.failed: Mapping[int, str] = {
-            unit: entries.error(unit)
-            for entries in journals
-            for unit in entries.failed
+            unit: text
+            for entries in stores
+            for unit, text in entries.failed().items()
             if unit not in self._home
         }
         self.missing: tuple[int, ...] = tuple(
@@ -66,7 +62,7 @@ class Results(Sequence[Any]):
         )
         self.done = len(self._home)
         self.cpu_s: float = sum(
-            entries.results[unit].measure.cpu_s for unit, entries in self._home.items()
+            measure.cpu_s for _, units in results for measure in units.values()
         )
 
     def __len__(self) -> int:
@@ -84,13 +80,7 @@ class Results(Sequence[Any]):
         if entries is None:
             status = Status.ERROR if unit in self.failed else Status.NOT_ATTEMPTED
             return self._kind.blank(self.document, unit, status)
-        try:
-            return self._kind.decode(entries.payload(unit))
-        except (LookupError, ValueError, TypeError, ArithmeticError) as error:
-            raise MapFileError(
-                f"unit {unit} of the journal is not a result of a {self._kind.name}: "
-                f"{error}"
-            ) from error
+        return entries.payload(unit)
 
     def check_failures(self, output: Path) -> None:
         """Raise IncompleteError when units have failed; the others are published."""
@@ -112,19 +102,19 @@ class Results(Sequence[Any]):
 
 
 def preview(path: Path) -> Any:
-    """Artefact of what a journal holds so far, its other frames not attempted.
+    """Artefact of what a store holds so far, its other frames not attempted.
 
     Parameters
     ----------
     path : Path
-        A journal, also one that is being written.
+        A store, also one that is being written.
 
     Returns
     -------
     artefact
-        What the kind of the journal assembles, a ``BinMap`` say.
+        What the kind of the store assembles, a ``BinMap`` say.
     """
-    with read_journal(path) as entries:
+    with read_store(path) as entries:
         kind = kind_named(entries.header.kind, source=path)
         results = Results(kind, [entries])
         return kind.assemble(results.document, results, run=RunInfo())

@@ -1,45 +1,40 @@
-"""Running a scan: journal, workers, artefact. Interrupt it anywhere, start it again.
+"""Computing units, and scans of them: interrupt them anywhere, start them again.
 
 ::
 
-    work ──▶ open_lanes ──▶ Crew.replies ──▶ Journal ──▶ Results ──▶ kind.assemble/write
+    work ──▶ open_pool ──▶ Pool.replies ──▶ Store ──▶ Results ──▶ kind.assemble/write
 
-Payloads reach the artefact through the journal only, so that one that was computed
+Payloads reach the artefact through the store only, so that one that was computed
 just now and one that an earlier run left are the same bits.
 """
 
 from __future__ import annotations
 
-import json
 import logging
 import shlex
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, closing, contextmanager, nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from reachmap.disk import is_there
+from reachmap.errors import EngineError, IncompleteError, NoRoomError, OutputError
 from reachmap.maps import RunClock, RunInfo, check_output
-from reachmap.runtime.journal.format import Header
-from reachmap.runtime.journal.journal import (
-    SYNC_INTERVAL_S,
-    Journal,
-    journal_path,
-    open_journal,
-)
+from reachmap.runtime.encoding import decode, encode
+from reachmap.runtime.executors import open_pool
+from reachmap.runtime.job import Job, Measure, Reply, Work, engine_versions, one_frame
+from reachmap.runtime.journal import UNITS, Header
+from reachmap.runtime.options import RunOptions
+from reachmap.runtime.pool import Pool
 from reachmap.runtime.progress import Progress
 from reachmap.runtime.results import Results, last_line
 from reachmap.runtime.signals import Interrupted, StopRequest, stop_signals
-from reachmap.runtime.work import Work
-from reachmap.runtime.workers.crew import Crew
-from reachmap.runtime.workers.executors import (
-    ExecutorChoice,
-    check_executor,
-    open_lanes,
-)
-from reachmap.runtime.workers.tasks import Reply, package_versions, parcel_from_work
+from reachmap.runtime.store import Store, open_store, store_path
+
+PUBLISHED = "published"
+"""Phase of notes on what this run has put in place of the output."""
 
 log = logging.getLogger(__name__)
 
@@ -51,7 +46,7 @@ class Outcome:
     Attributes
     ----------
     path : Path
-        The artefact, or the journal of a shard.
+        The artefact, or the store of a shard.
     artefact : object
         What was written; None for a shard.
     computed, resumed : int
@@ -66,148 +61,169 @@ class Outcome:
     run: RunInfo
 
 
-def run_scan(
-    work: Work,
+def run(
+    job: Job, units: Sequence[Any], options: RunOptions, progress: Progress
+) -> list[Any]:
+    """Payloads of units, in their order; for work that needs no store.
+
+    Raises
+    ------
+    EngineError
+        A unit failed.
+    ReachmapError, KeyboardInterrupt
+        As for :func:`run_scan`.
+    """
+    progress.begin(len(units))
+    with stop_signals() as stop, open_pool(options) as pool:
+        payloads = compute(pool, job, units, progress, stop=stop, most=len(units))
+    progress.end()
+    return payloads
+
+
+def compute(
+    pool: Pool,
+    job: Job,
+    units: Sequence[Any],
+    progress: Progress,
     *,
-    output: Path,
-    workers: int = 1,
-    executor: ExecutorChoice = "processes",
-    shard: tuple[int, int] | None = None,
-    restart: bool = False,
-    overwrite: bool = False,
-    progress: Progress | None = None,
-) -> Outcome:
+    most: int | None = None,
+    stop: StopRequest | None = None,
+    measured: Callable[[Reply], object] = lambda reply: None,
+) -> list[Any]:
+    """Payloads of units, in their order, on workers that are there already.
+
+    Parameters
+    ----------
+    most : int, optional
+        Workers to use at most; a single one is this process.
+    stop : StopRequest, optional
+        Is looked at now and then.
+    measured : callable
+        Is told of each unit as it arrives.
+
+    Raises
+    ------
+    EngineError
+        A unit failed.
+    """
+    payloads: list[Any] = [None] * len(units)
+    slots = pool.slots(len(units), most)
+    with closing(pool.replies(job, dict(enumerate(units)), slots)) as replies:
+        for reply in replies:
+            if stop is not None:
+                stop.check()
+            if reply is None:
+                progress.tick()
+                continue
+            if reply.failed:
+                raise _unit_failed(reply.index, decode(reply.text))
+            payloads[reply.index] = decode(reply.text)
+            measured(reply)
+            progress.add(reply.measure.frames, reply.measure.ok)
+    return payloads
+
+
+def run_scan(work: Work, *, output: Path, options: RunOptions, label: str) -> Outcome:
     """Compute a work and publish its artefact, going on where an earlier run ended.
 
     Parameters
     ----------
     work : Work
     output : Path
-        The artefact. Its journal lies beside it until it is published.
-    workers : int
-        Processes; 1 works in this process.
-    executor : str or callable
-        See :mod:`reachmap.runtime.workers.executors`.
-    shard : (int, int), optional
-        (i, N): do the i-th of N shares, and leave the journal for ``merge``.
-    restart : bool
-        Discard what an earlier run left.
-    overwrite : bool
-        Replace ``output``; not needed when its own journal lies beside it.
-    progress : Progress, optional
-
-    Returns
-    -------
-    Outcome
+        The artefact. Its store lies beside it until it is published.
+    options : RunOptions
+    label : str
+        First word of the progress report.
 
     Raises
     ------
     OutputError
         When ``output`` exists, cannot be written, or another run is at it.
     MapFileError
-        When the journal belongs to other settings.
+        When the store belongs to other settings.
     IncompleteError
         When units failed (the artefact is there, but for them), or there is no room.
     Interrupted
-        After Ctrl-C or SIGTERM; everything done is in the journal.
+        After Ctrl-C or SIGTERM; everything done is in the store.
     """
-    journal = journal_path(output, shard)
-    if shard is None:
-        check_output(output, overwrite=overwrite or is_there(journal))
-    clock = RunClock(workers=workers)
-    with ExitStack() as stack:
-        with clock.phase("units"):
-            results = stack.enter_context(
-                run_units(
-                    work,
-                    output=output,
-                    workers=workers,
-                    executor=executor,
-                    shard=shard,
-                    restart=restart,
-                    progress=progress,
-                )
-            )
-        clock.add_cpu("units", results.cpu_s)
-        run = clock.finish()
-        path, artefact = journal, None
-        if shard is None:
+    clock = RunClock(workers=options.workers)
+    with run_units(work, output=output, options=options, label=label, clock=clock) as (
+        results,
+        store,
+    ):
+        clock.add_cpu(UNITS, results.cpu_s)
+        info = clock.finish()
+        path, artefact = store.path, None
+        if options.shard is None:
             path = output
-            artefact = work.kind.assemble(results.document, results, run=run)
-            work.kind.write(output, artefact, overwrite=True)
+            artefact = work.kind.assemble(results.document, results, run=info)
+            _publish(work, artefact, output, store, options)
+        resumed = store.resumed
     results.check_failures(path)
     return Outcome(
         path=path,
         artefact=artefact,
-        computed=results.done - results.resumed,
-        resumed=results.resumed,
-        run=run,
+        computed=results.done - resumed,
+        resumed=resumed,
+        run=info,
     )
 
 
 @contextmanager
 def run_units(
-    work: Work,
-    *,
-    output: Path,
-    workers: int = 1,
-    executor: ExecutorChoice = "processes",
-    shard: tuple[int, int] | None = None,
-    restart: bool = False,
-    progress: Progress | None = None,
-) -> Iterator[Results]:
+    work: Work, *, output: Path, options: RunOptions, label: str, clock: RunClock
+) -> Iterator[tuple[Results, Store]]:
     """Compute the units that are not done; the part of :func:`run_scan` before writing.
 
-    The journal stays locked for the ``with`` block, in which the artefact is to be
-    published. Leaving the block normally removes the journal, unless units failed or
+    The store stays locked for the ``with`` block, in which the artefact is to be
+    published. Leaving the block normally removes the store, unless units failed or
     it is a shard's.
-
-    Parameters
-    ----------
-    work, output, workers, executor, shard, restart, progress
-        As for :func:`run_scan`.
-
-    Yields
-    ------
-    Results
-        Payloads of all units, of a shard's units for a shard.
 
     Raises
     ------
     ReachmapError, Interrupted
         As for :func:`run_scan`.
     """
-    check_executor(executor)
+    path = store_path(output, options.shard)
+    if options.shard is None:
+        check_output(output, overwrite=options.overwrite or is_there(path))
+    header = header_of(work, options.shard)
     with (
-        open_journal(
-            journal_path(output, shard),
-            header_of(work, shard),
-            restart=restart,
-            # Nobody looks at the clock while this process computes a unit.
-            sync_interval_s=0.0 if _is_alone(executor, workers) else SYNC_INTERVAL_S,
-        ) as journal,
+        open_store(path, header, restart=options.restart) as store,
         stop_signals() as stop,
     ):
-        resumed = len(journal.entries.results)
-        progress = progress or Progress("", quiet=True)
+        if options.shard is None:
+            check_output(output, overwrite=options.overwrite or _is_own(store, output))
         try:
-            _compute_missing(work, journal, workers, executor, progress, stop)
-            results = Results(work.kind, [journal.entries], resumed=resumed)
-            yield results
+            with ExitStack() as stack:
+                run = _Run(
+                    store=store,
+                    stop=stop,
+                    options=options,
+                    label=label,
+                    clock=clock,
+                    stack=stack,
+                )
+                _compute_missing(work, run)
+            results = Results(work.kind, [store])
+            yield results, store
         except KeyboardInterrupt:
-            raise Interrupted(_farewell(journal)) from None
-        if shard is None and not results.failed:
-            journal.remove()
+            raise Interrupted(
+                f"interrupted: {store.safe_text()}\n"
+                f"to go on: {command_line().replace(' --restart', '')}"
+            ) from None
+        if options.shard is None and not results.failed:
+            store.remove()
 
 
 def header_of(work: Work, shard: tuple[int, int] | None = None) -> Header:
-    """First line of the journal of a work; package versions are settings too."""
+    """Header of the store of a work; package versions are settings too."""
     return Header(
         kind=work.kind.name,
-        units=work.units,
+        units=len(work.units),
         shard=shard or (1, 1),
-        settings={**work.settings, "packages": package_versions()},
-        document=work.document,
+        settings={**work.settings, "packages": engine_versions()},
+        document=dict(work.document),
     )
 
 
@@ -218,68 +234,154 @@ def command_line() -> str:
     return shlex.join([program, *sys.argv[1:]])
 
 
-def _compute_missing(
-    work: Work,
-    journal: Journal,
-    workers: int,
-    executor: ExecutorChoice,
-    progress: Progress,
-    stop: StopRequest,
+@dataclass(kw_only=True)
+class _Run:
+    """A run at work; the :class:`~reachmap.runtime.job.Stages` of its work."""
+
+    store: Store
+    stop: StopRequest
+    options: RunOptions
+    label: str
+    clock: RunClock
+    stack: ExitStack
+    _pool: Pool | None = field(default=None, init=False)
+
+    def run(
+        self, phase: str, job: Job, units: Sequence[Any], *, most: int | None = None
+    ) -> list[Any]:
+        """Payloads of all units of a job of its own, on at most ``most`` workers."""
+        with self.clock.phase(phase):
+            self.complete(phase, job, dict(enumerate(units)), len(units), most)
+        for index, text in self.store.failed(phase).items():
+            raise _unit_failed(index, text)
+        return [self.store.payload(index, phase) for index in range(len(units))]
+
+    def once(
+        self,
+        phase: str,
+        function: Callable[[Progress], Any],
+        tally: Callable[[Any], tuple[int, int]] = one_frame,
+    ) -> Any:
+        """Payload of a single unit, computed by this process."""
+        if 0 not in self.store.results(phase):
+            with self.clock.phase(phase):
+                payload = function(self.progress(phase))
+            ok, frames = tally(payload)
+            measure = Measure(ok=ok, frames=frames)
+            reply = Reply(index=0, text=encode(payload), measure=measure)
+            self.store.put(reply, phase)
+            self.store.sync()
+        return self.store.payload(0, phase)
+
+    def progress(self, phase: str) -> Progress:
+        """Report of a phase."""
+        label = self.label if phase == UNITS else f"{self.label} {phase}"
+        return Progress(label, quiet=self.options.quiet)
+
+    def complete(
+        self,
+        phase: str,
+        job: Job,
+        units: Mapping[int, Any],
+        frames: int,
+        most: int | None = None,
+    ) -> None:
+        """Compute those of some units that the store does not hold yet."""
+        done = self.store.results(phase)
+        todo = {index: unit for index, unit in units.items() if index not in done}
+        progress = self.progress(phase)
+        progress.begin(
+            frames,
+            done=sum(measure.frames for measure in done.values()),
+            ok=sum(measure.ok for measure in done.values()),
+        )
+        try:
+            if todo:
+                self._compute(phase, job, todo, progress, frames // len(units), most)
+        finally:
+            progress.end()
+
+    def _compute(
+        self,
+        phase: str,
+        job: Job,
+        todo: Mapping[int, Any],
+        progress: Progress,
+        frames: int,
+        most: int | None,
+    ) -> None:
+        if self._pool is None:
+            self._pool = self.stack.enter_context(open_pool(self.options))
+        slots = self._pool.slots(len(todo), most)
+        with (
+            # A unit in this process is broken off; others are let to arrive.
+            nullcontext() if slots[0].is_here else self.stop.deferred(),
+            closing(self._pool.replies(job, todo, slots)) as replies,
+        ):
+            for reply in replies:
+                if reply is None:
+                    self.store.sync()  # all that have arrived, in one go
+                    self.stop.check()
+                    progress.tick()
+                    continue
+                self.store.put(reply, phase)
+                if reply.failed:
+                    text = decode(reply.text)
+                    log.warning("unit %d failed: %s", reply.index, last_line(text))
+                    log.debug("%s", text)
+                progress.add(reply.measure.frames or frames, reply.measure.ok)
+
+
+def _compute_missing(work: Work, run: _Run) -> None:
+    own = {index: work.units[index] for index in run.store.header.own_units()}
+    left = len(own) - run.store.resumed
+    if run.store.resumed:
+        log.info("%d units were done before, %d are left", run.store.resumed, left)
+    if left and (job := work.job(run)) is not None:
+        with run.clock.phase(UNITS):
+            run.complete(UNITS, job, own, work.frames * len(own) // len(work.units))
+
+
+def _publish(
+    work: Work, artefact: Any, output: Path, store: Store, options: RunOptions
 ) -> None:
-    entries = journal.entries
-    before = [record.measure for record in entries.results.values()]
-    todo = [unit for unit in entries.header.own_units() if unit not in entries.results]
-    if before:
-        log.info("%d units were done before, %d are left", len(before), len(todo))
-    progress.begin(
-        _own_frames(work, entries.header),
-        done=sum(measure.frames for measure in before),
-        ok=sum(measure.ok for measure in before),
-    )
+    """Put an artefact in place; the store knows about it before and after."""
+    overwrite = options.overwrite or _is_own(store, output)
     try:
-        if todo:
-            with (
-                open_lanes(executor, workers, parcel_from_work(work)) as lanes,
-                Crew(lanes) as crew,
-                # A unit in this process is broken off; others are let to arrive.
-                nullcontext() if _is_alone(executor, workers) else stop.deferred(),
-                closing(crew.replies(todo)) as replies,
-            ):
-                for reply in replies:
-                    if reply is None:
-                        stop.check()
-                        journal.sync_if_due()
-                        progress.tick()
-                    else:
-                        _record(work, reply, journal, progress)
-    finally:
-        progress.end()
+        _note(store, {"replaces": _identity(output)})
+        work.kind.write(output, artefact, overwrite=overwrite)
+        _note(store, {"is": _identity(output)})
+    except OutputError as error:
+        lines = [*error.lines, f"{store.safe_text()}; the same command goes on"]
+        if isinstance(error, NoRoomError):
+            raise IncompleteError([*lines, "free some space first"]) from error
+        raise OutputError(lines) from error
 
 
-def _record(work: Work, reply: Reply, journal: Journal, progress: Progress) -> None:
-    journal.append(
-        reply.unit, reply.payload, failed=reply.failed, measure=reply.measure
-    )
-    if reply.failed:
-        text = json.loads(reply.payload)
-        log.warning("unit %d failed: %s", reply.unit, last_line(text))
-        log.debug("%s", text)
-    frames = reply.measure.frames or work.total_frames // work.units
-    progress.add(frames, reply.measure.ok)
+def _note(store: Store, note: Mapping[str, Any]) -> None:
+    number = len(store.results(PUBLISHED))
+    store.put(Reply(index=number, text=encode(note)), PUBLISHED)
+    store.sync()
 
 
-def _is_alone(executor: ExecutorChoice, workers: int) -> bool:
-    return executor == "processes" and workers == 1
+def _is_own(store: Store, output: Path) -> bool:
+    """Whether what stands in the place of the output was put there by this work."""
+    notes = store.results(PUBLISHED)
+    if not notes:
+        return False
+    note = store.payload(max(notes), PUBLISHED)
+    if "is" in note:
+        return bool(note["is"] == _identity(output))
+    # Killed while publishing: what is there now is new, or is not.
+    return bool(note.get("replaces") != _identity(output))
 
 
-def _own_frames(work: Work, header: Header) -> int:
-    return work.total_frames * len(header.own_units()) // work.units
+def _identity(path: Path) -> list[int] | None:
+    if not is_there(path):
+        return None
+    found = path.stat()
+    return [found.st_ino, found.st_size, found.st_mtime_ns]
 
 
-def _farewell(journal: Journal) -> str:
-    entries = journal.entries
-    return (
-        f"interrupted: {len(entries.results)} of {len(entries.header.own_units())} "
-        f"units are safe in {journal.path}\n"
-        f"to go on: {command_line().replace(' --restart', '')}"
-    )
+def _unit_failed(index: int, text: str) -> EngineError:
+    return EngineError(f"unit {index} failed: {last_line(text)}")

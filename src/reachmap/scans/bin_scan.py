@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,16 +18,18 @@ from reachmap.core.scene import Scene
 from reachmap.maps import BinMap, PathStore, RunInfo, Stamp, Status, write_bin_map
 from reachmap.maps.parts import ApproachTimes, Effort
 from reachmap.maps.records import freeze
-from reachmap.runtime.work import Kind, Work
-from reachmap.sampling.frames import bin_test_frames
+from reachmap.runtime.job import Job, Kind, Stages, Work, blocks
+from reachmap.runtime.progress import Progress
+from reachmap.sampling.frames import FrameGrid, bin_test_frames
 from reachmap.scans.document import journal_settings, provenance_from_document
-from reachmap.scans.ik_survey import Survey
+from reachmap.scans.ik_survey import Survey, SurveyContext, survey_in_stages
 from reachmap.scans.measured import (
     MEASURED,
     SECONDS_PER_CHECK,
     Meter,
     attempt_seed,
 )
+from reachmap.scans.workspace_roadmap import connect_survey
 
 if TYPE_CHECKING:
     from reachmap.cell.loading import LoadedCell
@@ -197,47 +200,74 @@ class BinContext:
     connected: BoolArray
 
 
-def bin_work(
-    loaded: LoadedCell,
-    document: Mapping[str, Any],
-    survey: Survey,
-    connected: BoolArray,
-) -> Work:
+def bin_work(scene: Scene, document: Mapping[str, Any]) -> Work:
     """Work of a bin scan.
 
     Parameters
     ----------
-    loaded : LoadedCell
+    scene : Scene
+        With the bin.
     document : mapping
-    survey : Survey
-        Of all test grasps.
-    connected : bool array, shape (grasps,)
-        Whether the roadmap proves a path.
+        See :func:`reachmap.scans.document.scan_document`.
     """
-    grasps = len(survey.status)
+    grasps = grasp_grid(scene).size
     return Work(
         kind=KIND,
-        units=-(-grasps // GRASPS_PER_UNIT),
+        units=blocks(grasps, GRASPS_PER_UNIT),
+        job=partial(planning_job, scene),
+        settings=journal_settings(document),
+        document={**document, "grasps": grasps},
+        frames=grasps,
+    )
+
+
+def grasp_grid(scene: Scene) -> FrameGrid:
+    """Test grasps of a scan, in robot_base."""
+    return bin_test_frames(scene.loaded.cell, scene.T_base_bin).frames
+
+
+def planning_job(scene: Scene, stages: Stages) -> Job:
+    """Survey the test grasps and connect them; what is left is to plan to each."""
+    spec = scene.loaded.cell.bin_scan
+    context = SurveyContext(
+        loaded=scene.loaded,
+        with_bin=True,
+        grids=(grasp_grid(scene),),
+        approach_m=spec.approach_distance_m,
+    )
+    survey = survey_in_stages(context, stages)
+
+    def connect(progress: Progress) -> BoolArray:
+        connection = connect_survey(
+            scene,
+            survey,
+            seed=scene.loaded.cell.seed,
+            progress=progress,
+        )
+        connected = np.zeros(len(survey.status), bool)
+        connected[connection.roadmap.frames_reached()] = True
+        return connected
+
+    return Job(
         function=plan_unit,
         prepare=prepare,
-        context=BinContext(loaded=loaded, survey=survey, connected=connected),
-        settings=journal_settings(document),
-        document=document,
+        context=BinContext(
+            loaded=scene.loaded,
+            survey=survey,
+            connected=stages.once("connect", connect),
+        ),
         tally=tally,
-        frames=grasps,
     )
 
 
 def prepare(context: BinContext) -> tuple[BinContext, Scene]:
     """Build the scene, once per worker."""
-    return context, Scene.build(context.loaded, with_bin=True)
+    return context, Scene.shared(context.loaded, with_bin=True)
 
 
-def plan_unit(state: tuple[BinContext, Scene], unit: int) -> dict[str, Any]:
+def plan_unit(state: tuple[BinContext, Scene], grasps: range) -> dict[str, Any]:
     """Plan all attempts at the test grasps of one unit."""
     context, scene = state
-    begin = unit * GRASPS_PER_UNIT
-    grasps = range(begin, min(begin + GRASPS_PER_UNIT, len(context.survey.status)))
     parts = plan_grasps(scene, context.survey, grasps, context.connected[grasps])
     return dataclasses.asdict(GraspResults.join(parts))
 

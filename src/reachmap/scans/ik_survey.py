@@ -18,8 +18,7 @@ from reachmap.core.planning.approach import StraightApproach
 from reachmap.core.planning.roadmap import Goals
 from reachmap.core.scene import Scene
 from reachmap.maps.records import NO_PAIR, Status, freeze
-from reachmap.runtime.parallel import compute_units
-from reachmap.runtime.progress import Progress
+from reachmap.runtime.job import Job, Stages
 from reachmap.sampling.frames import FrameGrid
 
 if TYPE_CHECKING:
@@ -252,32 +251,28 @@ class SurveyContext:
         ]
 
 
-def run_survey(
-    context: SurveyContext, *, workers: int, executor: str, progress: Progress
-) -> Survey:
+def survey_in_stages(context: SurveyContext, stages: Stages) -> Survey:
     """Survey all frames; the result does not depend on the number of workers."""
     frames = sum(grid.size for grid in context.grids)
-    payloads = compute_units(
-        survey_unit,
-        len(context.blocks()),
-        prepare=prepare_survey,
-        context=context,
-        workers=min(workers, max(1, math.ceil(frames / (4 * FRAMES_PER_UNIT)))),
-        executor=executor,
-        progress=progress,
+    payloads = stages.run(
+        "survey",
+        Job(function=survey_unit, prepare=prepare_survey, context=context),
+        context.blocks(),
+        most=max(1, math.ceil(frames / (4 * FRAMES_PER_UNIT))),
     )
     return join_surveys([Survey(**payload) for payload in payloads])
 
 
 def prepare_survey(context: SurveyContext) -> tuple[SurveyContext, Scene]:
     """Build the scene, once per worker."""
-    return context, Scene.build(context.loaded, with_bin=context.with_bin)
+    return context, Scene.shared(context.loaded, with_bin=context.with_bin)
 
 
-def survey_unit(state: tuple[SurveyContext, Scene], unit: int) -> dict[str, Any]:
+def survey_unit(
+    state: tuple[SurveyContext, Scene], block: tuple[int, slice]
+) -> dict[str, Any]:
     """Survey one block of frames."""
     context, scene = state
-    grid, block = context.blocks()[unit]
-    T = context.grids[grid].transforms_at(block)
+    T = context.grids[block[0]].transforms_at(block[1])
     survey = survey_frames(scene, T, context.approach_m)
     return {f.name: getattr(survey, f.name) for f in dataclasses.fields(survey)}

@@ -15,7 +15,8 @@ from reachmap.core.kinematics.windings import Windings
 from reachmap.core.planning.timing import path_length_rad
 from reachmap.core.scene import Scene
 from reachmap.maps import RunInfo, Status, WorkspaceMap, write_workspace_map
-from reachmap.runtime.work import Kind, Work
+from reachmap.maps.parts import Components
+from reachmap.runtime.job import Job, Kind, Work, blocks
 from reachmap.sampling.frames import workspace_frames
 from reachmap.scans.document import journal_settings
 from reachmap.scans.ik_survey import survey_frames
@@ -47,15 +48,18 @@ def per_frame_work(
 ) -> Work:
     """Work of a scan that plans to each frame."""
     frames = frames_of_cell(loaded.cell)
-    return Work(
-        kind=KIND,
-        units=-(-frames // FRAMES_PER_UNIT),
+    job = Job(
         function=plan_unit,
         prepare=prepare,
         context=PerFrameContext(loaded=loaded, with_bin=with_bin),
-        settings=journal_settings(document),
-        document=document,
         tally=tally,
+    )
+    return Work(
+        kind=KIND,
+        units=blocks(frames, FRAMES_PER_UNIT),
+        job=lambda stages: job,
+        settings=journal_settings(document),
+        document={**document, "frames_per_unit": FRAMES_PER_UNIT},
         frames=frames,
     )
 
@@ -71,16 +75,14 @@ def prepare(context: PerFrameContext) -> _State:
     cell = context.loaded.cell
     cubes = workspace_frames(cell)
     return _State(
-        scene=Scene.build(context.loaded, with_bin=context.with_bin),
+        scene=Scene.shared(context.loaded, with_bin=context.with_bin),
         poses=np.concatenate([c.frames.transforms().reshape(-1, 4, 4) for c in cubes]),
     )
 
 
-def plan_unit(state: _State, unit: int) -> dict[str, Any]:
+def plan_unit(state: _State, frames: range) -> dict[str, Any]:
     """Plan to the frames of one unit."""
-    scene, begin = state.scene, unit * FRAMES_PER_UNIT
-    frames = np.arange(begin, min(begin + FRAMES_PER_UNIT, len(state.poses)))
-    results = plan_frames(scene, state.poses[frames], frames.tolist())
+    results = plan_frames(state.scene, state.poses[frames], frames)
     return dataclasses.asdict(results)
 
 
@@ -138,19 +140,26 @@ def tally(payload: Mapping[str, Any]) -> tuple[int, int]:
 def blank(document: Mapping[str, Any], unit: int, status: Status) -> dict[str, Any]:
     """Payload of a unit without results."""
     cell = Cell.model_validate_json(document["provenance"]["cell_resolved_json"])
-    left = frames_of_cell(cell) - unit * FRAMES_PER_UNIT
+    size = document["frames_per_unit"]
+    left = frames_of_cell(cell) - unit * size
     dof = len(document["joint_names"])
-    return dataclasses.asdict(
-        FrameResults.blank(min(FRAMES_PER_UNIT, left), dof, status)
-    )
+    return dataclasses.asdict(FrameResults.blank(min(size, left), dof, status))
 
 
 def assemble(
     document: Mapping[str, Any], payloads: Sequence[Any], *, run: RunInfo
 ) -> WorkspaceMap:
     """Make the map from the payloads of all units."""
-    results = FrameResults.join([FrameResults(**payload) for payload in payloads])
-    return assemble_workspace_map(document, results, run=run)
+    parts = [dict(payload) for payload in payloads]
+    evidence = parts[0].pop("components", None)  # of the roadmap's one unit
+    return assemble_workspace_map(
+        document,
+        FrameResults.join([FrameResults(**part) for part in parts]),
+        run=run,
+        components=None
+        if evidence is None
+        else Components(**evidence | {"methods": tuple(evidence["methods"])}),
+    )
 
 
 KIND = Kind(

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import dataclasses
+from collections.abc import Mapping, Sequence
+from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -11,9 +14,59 @@ from reachmap.core.planning.connection import Connection, connect
 from reachmap.core.scene import Scene
 from reachmap.maps import Status
 from reachmap.maps.parts import Components
+from reachmap.runtime.job import Stages, Work
+from reachmap.runtime.journal import UNITS
 from reachmap.runtime.progress import Progress
-from reachmap.scans.ik_survey import MAX_COUNT, Survey
+from reachmap.sampling.frames import workspace_frames
+from reachmap.scans.document import journal_settings
+from reachmap.scans.ik_survey import MAX_COUNT, Survey, SurveyContext, survey_in_stages
+from reachmap.scans.workspace_per_frame import KIND, frames_of_cell, tally
 from reachmap.scans.workspace_results import FrameResults
+
+
+def roadmap_work(scene: Scene, document: Mapping[str, Any]) -> Work:
+    """Work of a scan by connectivity, which looks at all frames together.
+
+    Parameters
+    ----------
+    scene : Scene
+    document : mapping
+        See :func:`reachmap.scans.document.scan_document`.
+    """
+    frames = frames_of_cell(scene.loaded.cell)
+    return Work(
+        kind=KIND,
+        units=["connection"],
+        job=partial(connect_all, scene),
+        settings=journal_settings(document),
+        document={**document, "frames_per_unit": frames},
+        frames=frames,
+    )
+
+
+def connect_all(scene: Scene, stages: Stages) -> None:
+    """Survey all frames, then do the one unit of the work: connect them."""
+    cell = scene.loaded.cell
+    cubes = workspace_frames(cell)
+    context = SurveyContext(
+        loaded=scene.loaded,
+        with_bin=scene.with_bin,
+        grids=tuple(cube.frames for cube in cubes),
+        approach_m=0.0,
+    )
+    survey = survey_in_stages(context, stages)
+
+    def connect(progress: Progress) -> dict[str, Any]:
+        connection = connect_survey(
+            scene,
+            survey,
+            seed=cell.seed,
+            progress=progress,
+        )
+        results = dataclasses.asdict(results_of_connection(survey, connection))
+        return results | {"components": dataclasses.asdict(components_of(connection))}
+
+    stages.once(UNITS, connect, tally)
 
 
 def connect_survey(

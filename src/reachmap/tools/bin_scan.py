@@ -9,23 +9,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from reachmap._typing import BoolArray
 from reachmap.cell.loading import read_cell
 from reachmap.core.scene import Scene
 from reachmap.maps import BinMap, Status, read_placement, read_workspace_map
-from reachmap.runtime.progress import Progress
+from reachmap.runtime.options import IN_PROCESS, RunOptions
 from reachmap.runtime.run import run_scan
-from reachmap.sampling.frames import FrameGrid, bin_test_frames
-from reachmap.scans.bin_scan import bin_work, plan_grasps
-from reachmap.scans.document import checking_settings, scan_document
-from reachmap.scans.ik_survey import Survey, SurveyContext, run_survey, survey_frames
-from reachmap.scans.workspace_roadmap import connect_survey
-from reachmap.tools.options import (
-    IN_PROCESS,
-    RunOptions,
-    cell_of_artefact,
-    with_seed,
+from reachmap.scans.bin_scan import (
+    bin_work,
+    grasp_grid,
+    plan_grasps,
 )
+from reachmap.scans.document import checking_settings, scan_document
+from reachmap.scans.ik_survey import survey_frames
+from reachmap.tools.options import cell_of_artefact, with_seed
 from reachmap.tools.prologue import (
     check_scan_output,
     path_of_cell,
@@ -82,7 +78,7 @@ def bin_scan(
         placement, cell, with_seed(overrides, seed), workspace
     )
     refuse_cell_files([output], loaded)
-    scene = Scene.build(loaded, with_bin=True)
+    scene = Scene.shared(loaded, with_bin=True)
     scene.require_free_scan_configuration()
     document = scan_document(
         scene,
@@ -91,22 +87,8 @@ def bin_scan(
         settings=_settings(scene),
         source_sha256=source,
     )
-    survey = run_survey(
-        _survey_context(loaded, scene),
-        workers=run.workers,
-        executor=run.executor,
-        progress=Progress("bin-scan survey", quiet=run.quiet),
-    )
-    connected = _connected(scene, survey, Progress("bin-scan connect", quiet=run.quiet))
     outcome = run_scan(
-        bin_work(loaded, document | {"grasps": len(survey.status)}, survey, connected),
-        output=output,
-        workers=run.workers,
-        executor=run.executor,
-        shard=run.shard,
-        restart=run.restart,
-        overwrite=run.overwrite,
-        progress=Progress("bin-scan", quiet=run.quiet),
+        bin_work(scene, document), output=output, options=run, label="bin-scan"
     )
     return outcome.artefact  # type: ignore[no-any-return]
 
@@ -155,9 +137,9 @@ def estimate_bin_scan(
 ) -> dict[str, Any]:
     """Say what a scan would do, timed on a few test grasps; nothing is written."""
     loaded, _ = load_placed_cell(placement, cell, with_seed(overrides, seed), workspace)
-    scene = Scene.build(loaded, with_bin=True)
+    scene = Scene.shared(loaded, with_bin=True)
     scene.require_free_scan_configuration()
-    grid = _grid(loaded, scene)
+    grid = grasp_grid(scene)
     rows = np.random.default_rng(0).permutation(grid.size)[:SAMPLE_GRASPS]
     begin = time.perf_counter()
     survey = survey_frames(
@@ -171,33 +153,6 @@ def estimate_bin_scan(
         "plans": grid.size * loaded.cell.bin_scan.repeats,
         "estimated_s": round(seconds / run.workers / shards_of(run), 1),
     }
-
-
-def _connected(scene: Scene, survey: Survey, progress: Progress) -> BoolArray:
-    """Which test grasps the roadmap proves reachable, shape (grasps,)."""
-    cell = scene.loaded.cell
-    connection = connect_survey(
-        scene,
-        survey,
-        seed=cell.seed,
-        progress=progress,
-    )
-    connected = np.zeros(len(survey.status), bool)
-    connected[connection.roadmap.frames_reached()] = True
-    return connected
-
-
-def _grid(loaded: LoadedCell, scene: Scene) -> FrameGrid:
-    return bin_test_frames(loaded.cell, scene.T_base_bin).frames
-
-
-def _survey_context(loaded: LoadedCell, scene: Scene) -> SurveyContext:
-    return SurveyContext(
-        loaded=loaded,
-        with_bin=True,
-        grids=(_grid(loaded, scene),),
-        approach_m=loaded.cell.bin_scan.approach_distance_m,
-    )
 
 
 def _settings(scene: Scene) -> dict[str, Any]:

@@ -3,28 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from reachmap.cell.loading import cell_from_json
 from reachmap.maps import Provenance
-from reachmap.runtime.journal.journal import journal_path
+from reachmap.runtime.options import RunOptions
+from reachmap.runtime.store import store_path
+
+__all__ = ["RunOptions", "cell_of_artefact", "with_seed", "written_by"]
 
 if TYPE_CHECKING:
     from reachmap.cell.loading import LoadedCell
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class RunOptions:
-    """How a scan is carried out; nothing here changes its result."""
-
-    workers: int = 1
-    executor: str = "processes"
-    shard: tuple[int, int] | None = None
-    restart: bool = False
-    overwrite: bool = False
-    quiet: bool = True
 
 
 def with_seed(overrides: Sequence[str], seed: int | None) -> tuple[str, ...]:
@@ -34,7 +24,7 @@ def with_seed(overrides: Sequence[str], seed: int | None) -> tuple[str, ...]:
 
 def written_by(output: Path, run: RunOptions) -> Path:
     """Name the file that a scan leaves: the artefact, or the journal of a shard."""
-    return output if run.shard is None else journal_path(output, run.shard)
+    return output if run.shard is None else store_path(output, run.shard)
 
 
 def cell_of_artefact(
@@ -60,6 +50,3 @@ def cell_of_artefact(
         files_sha256=provenance.files_sha256,
         source=source,
     )
-
-
-IN_PROCESS = RunOptions()

@@ -44,13 +44,14 @@ from reachmap.placement.problem import Question
 from reachmap.placement.search import decide_by_search
 from reachmap.placement.settings import placement_settings
 from reachmap.placement.summary import best_rows, placement_facts, row_facts
+from reachmap.runtime.options import IN_PROCESS, RunOptions
 from reachmap.runtime.progress import Progress
 from reachmap.scans.document import (
     checking_settings,
     provenance_from_document,
     scan_document,
 )
-from reachmap.tools.options import IN_PROCESS, RunOptions, cell_of_artefact, with_seed
+from reachmap.tools.options import cell_of_artefact, with_seed
 from reachmap.tools.prologue import refuse_cell_files
 
 if TYPE_CHECKING:
@@ -153,8 +154,7 @@ def place_bin(
     with open_evaluator(
         loaded,
         is_open,
-        workers=run.workers,
-        executor=run.executor,
+        run,
         progress=Progress("place-bin", quiet=run.quiet),
     ) as evaluator:
         keep_scan = choice.keep_scan_configuration or not can_choose(scene)

@@ -13,8 +13,8 @@ from reachmap.cell.text.yaml_reader import parse_yaml
 from reachmap.disk import is_there, real_path
 from reachmap.errors import CellError
 from reachmap.maps import check_output, check_outputs
-from reachmap.runtime.journal.journal import journal_path
-from reachmap.tools.options import RunOptions
+from reachmap.runtime.options import RunOptions
+from reachmap.runtime.store import store_path
 
 
 def check_scan_output(
@@ -25,7 +25,7 @@ def check_scan_output(
     An output with a journal beside it may be what an earlier part of this run has
     published; whether it is, the run itself finds out.
     """
-    journal = journal_path(output, run.shard)
+    journal = store_path(output, run.shard)
     resumes = is_there(journal) and not run.restart
     target = output if run.shard is None else journal
     check_outputs([target], overwrite=run.overwrite or resumes, inputs=inputs)

@@ -19,8 +19,9 @@ from reachmap.ranking.answers.ranked_list import RankedList
 from reachmap.ranking.lists.reading import STDIN
 from reachmap.ranking.lookup.ranker import Ranker
 from reachmap.ranking.lookup.settings import CostBasis, RankSettings
+from reachmap.runtime.options import IN_PROCESS, RunOptions
 from reachmap.runtime.progress import Progress
-from reachmap.tools.options import IN_PROCESS, RunOptions, cell_of_artefact
+from reachmap.tools.options import cell_of_artefact
 from reachmap.tools.prologue import refuse_cell_files
 from reachmap.tools.rank import ListFormat, ranker_of, read_list
 from reachmap.validation.facts import facts_of
@@ -131,14 +132,9 @@ def validate(
     context = replace(context, picks=join_picks([picks_of(one) for one in ranked]))
     if not len(context.picks):
         raise GraspListError("there are no grasps to plan to")
-    scene = Scene.build(context.loaded, with_bin=True)
+    scene = Scene.shared(context.loaded, with_bin=True)
     scene.require_free_scan_configuration()
-    results = plan_picks(
-        context,
-        workers=run.workers,
-        executor=run.executor,
-        progress=Progress("validate", quiet=run.quiet),
-    )
+    results = plan_picks(context, run, progress=Progress("validate", quiet=run.quiet))
     validation = summarise(
         [
             judge_list(label, one, ranker, bin_map, part)

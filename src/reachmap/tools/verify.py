@@ -10,8 +10,8 @@ from typing import Any
 from reachmap.errors import MapFileError
 from reachmap.maps.format.registry import load_any
 from reachmap.maps.format.store import is_sealed
+from reachmap.runtime.journal import is_store, read_store
 from reachmap.text import plural
-from reachmap.tools.artefacts import is_journal
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -92,7 +92,7 @@ def verify(paths: Sequence[Path]) -> Verification:
 
 def _verdict(path: Path) -> Verdict:
     try:
-        return _journal(path) if is_journal(path) else _artefact(path)
+        return _journal(path) if is_store(path) else _artefact(path)
     except MapFileError as error:
         return Verdict(path=path, kind="", facts={}, problems=error.lines)
 
@@ -109,14 +109,12 @@ def _artefact(path: Path) -> Verdict:
 
 
 def _journal(path: Path) -> Verdict:
-    from reachmap.runtime.journal.entries import read_journal
-
-    with read_journal(path) as entries:
+    with read_store(path) as entries:
         own = len(entries.header.own_units())
         facts = {
             "units": own,
-            "done": len(entries.results),
-            "failed": len(entries.failed),
+            "done": len(entries.results()),
+            "failed": len(entries.failed()),
             "torn_bytes": path.stat().st_size - entries.end,
         }
         kind = f"journal of a {entries.header.kind.replace('_', ' ')}"

@@ -6,7 +6,7 @@ import logging
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -14,35 +14,22 @@ from reachmap.cell.loading import read_cell
 from reachmap.cell.mounting import leaning_levels
 from reachmap.core.scene import Scene
 from reachmap.errors import SettingsError
-from reachmap.maps import (
-    RunClock,
-    Status,
-    WorkspaceMap,
-    write_workspace_map,
-)
+from reachmap.maps import Status, WorkspaceMap
 from reachmap.maps.summary.statistics import level_means
-from reachmap.runtime.progress import Progress
+from reachmap.runtime.options import IN_PROCESS, RunOptions
 from reachmap.runtime.run import run_scan
 from reachmap.sampling.frames import workspace_frames
 from reachmap.scans.document import checking_settings, scan_document
-from reachmap.scans.ik_survey import SurveyContext, run_survey, survey_frames
+from reachmap.scans.ik_survey import survey_frames
 from reachmap.scans.workspace_per_frame import per_frame_work, plan_frames
-from reachmap.scans.workspace_results import assemble_workspace_map
-from reachmap.scans.workspace_roadmap import (
-    components_of,
-    connect_survey,
-    results_of_connection,
-)
-from reachmap.tools.options import IN_PROCESS, RunOptions, with_seed
+from reachmap.scans.workspace_roadmap import connect_survey, roadmap_work
+from reachmap.tools.options import with_seed
 from reachmap.tools.prologue import (
     check_scan_output,
     path_of_cell,
     refuse_cell_files,
     shards_of,
 )
-
-if TYPE_CHECKING:
-    from reachmap.cell.loading import LoadedCell
 
 logger = logging.getLogger(__name__)
 
@@ -95,61 +82,17 @@ def workspace_scan(
     leaning = leaning_levels(loaded.cell)
     if leaning:
         logger.warning("%s: %s", loaded.source, leaning)
-    scene = Scene.build(loaded, with_bin=with_bin)
+    scene = Scene.shared(loaded, with_bin=with_bin)
     scene.require_free_scan_configuration()
     document = scan_document(
         scene, kind="workspace_map", method=method, settings=_settings(scene, method)
     )
     if method == "per-frame":
-        outcome = run_scan(
-            per_frame_work(loaded, document, with_bin=with_bin),
-            output=output,
-            workers=run.workers,
-            executor=run.executor,
-            shard=run.shard,
-            restart=run.restart,
-            overwrite=run.overwrite,
-            progress=Progress("workspace-scan", quiet=run.quiet),
-        )
-        return outcome.artefact  # type: ignore[no-any-return]
-    workspace = _scan_by_roadmap(scene, document, run)
-    write_workspace_map(output, workspace, overwrite=run.overwrite)
-    return workspace
-
-
-def _scan_by_roadmap(
-    scene: Scene, document: dict[str, Any], run: RunOptions
-) -> WorkspaceMap:
-    clock = RunClock(workers=run.workers)
-    with clock.phase("survey"):
-        survey = run_survey(
-            _survey_context(scene.loaded, with_bin=scene.with_bin),
-            workers=run.workers,
-            executor=run.executor,
-            progress=Progress("workspace-scan survey", quiet=run.quiet),
-        )
-    with clock.phase("connect"):
-        connection = connect_survey(
-            scene,
-            survey,
-            seed=scene.loaded.cell.seed,
-            progress=Progress("workspace-scan connect", quiet=run.quiet),
-        )
-    results = results_of_connection(survey, connection)
-    return assemble_workspace_map(
-        document, results, run=clock.finish(), components=components_of(connection)
-    )
-
-
-def _survey_context(loaded: LoadedCell, *, with_bin: bool) -> SurveyContext:
-    cell = loaded.cell
-    cubes = workspace_frames(cell)
-    return SurveyContext(
-        loaded=loaded,
-        with_bin=with_bin,
-        grids=tuple(cube.frames for cube in cubes),
-        approach_m=0.0,
-    )
+        work = per_frame_work(loaded, document, with_bin=with_bin)
+    else:
+        work = roadmap_work(scene, document)
+    outcome = run_scan(work, output=output, options=run, label="workspace-scan")
+    return outcome.artefact  # type: ignore[no-any-return]
 
 
 def _check_method(method: str, run: RunOptions) -> None:

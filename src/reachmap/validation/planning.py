@@ -14,8 +14,10 @@ from reachmap.core.kinematics.windings import Windings
 from reachmap.core.planning.planner import PlanResult
 from reachmap.core.scene import Scene
 from reachmap.maps.records import NO_PAIR, Status, freeze
-from reachmap.runtime.parallel import compute_units
+from reachmap.runtime.job import Job
+from reachmap.runtime.options import RunOptions
 from reachmap.runtime.progress import Progress
+from reachmap.runtime.run import run
 from reachmap.scans.ik_survey import Survey, survey_frames
 from reachmap.scans.measured import MEASURED, Meter, attempt_seed
 from reachmap.validation.picks import Picks, tool_poses
@@ -85,18 +87,11 @@ class PickResults:
 
 
 def plan_picks(
-    context: PickContext, *, workers: int, executor: str, progress: Progress
+    context: PickContext, options: RunOptions, *, progress: Progress
 ) -> PickResults:
     """Plan to every grasp; verdicts do not depend on the number of workers."""
-    payloads = compute_units(
-        plan_unit,
-        len(context.picks),
-        prepare=prepare,
-        context=context,
-        workers=workers,
-        executor=executor,
-        progress=progress,
-    )
+    job = Job(function=plan_unit, prepare=prepare, context=context)
+    payloads = run(job, range(len(context.picks)), options, progress)
     return PickResults(
         **{
             name: np.concatenate([payload[name] for payload in payloads])
@@ -107,19 +102,19 @@ def plan_picks(
 
 def prepare(context: PickContext) -> tuple[PickContext, Scene]:
     """Build the scene, once per worker."""
-    return context, Scene.build(context.loaded, with_bin=True)
+    return context, Scene.shared(context.loaded, with_bin=True)
 
 
-def plan_unit(state: tuple[PickContext, Scene], unit: int) -> dict[str, Any]:
+def plan_unit(state: tuple[PickContext, Scene], pick: int) -> dict[str, Any]:
     """Plan to one grasp."""
     context, scene = state
     T = tool_poses(
         context.picks,
-        unit,
+        pick,
         rolls=context.rolls,
         approach_axis=scene.loaded.cell.robot.tcp.approach_axis,
     )
-    key = (context.seed, int(context.picks.number[unit]))
+    key = (context.seed, int(context.picks.number[pick]))
     results = plan_pick(scene, T, key, context.repeats)
     return dataclasses.asdict(results)
 

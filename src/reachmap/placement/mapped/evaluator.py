@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
-import json
-import secrets
 from collections.abc import Iterator, Sequence
-from contextlib import closing, contextmanager
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -14,17 +12,15 @@ import numpy as np
 
 from reachmap._typing import BoolArray, FloatArray
 from reachmap.core.scene import Scene
-from reachmap.errors import EngineError
 from reachmap.placement.mapped.exact import ALWAYS, NEVER, PlacedScene, Pose, PoseScore
 from reachmap.placement.mapped.imaging import UNSEEN, imaging_configurations
 from reachmap.placement.mapped.sample import COARSE, Grid, Sample, sample_of
-from reachmap.runtime.encoding import json_from_value, value_from_json
+from reachmap.runtime.executors import open_pool
+from reachmap.runtime.job import Job, Reply
+from reachmap.runtime.options import RunOptions
+from reachmap.runtime.pool import Pool
 from reachmap.runtime.progress import Progress
-from reachmap.runtime.results import last_line
-from reachmap.runtime.work import one_frame
-from reachmap.runtime.workers.crew import Crew
-from reachmap.runtime.workers.executors import open_lanes
-from reachmap.runtime.workers.tasks import Job, Parcel, package_versions
+from reachmap.runtime.run import compute
 
 if TYPE_CHECKING:
     from reachmap.cell.loading import LoadedCell
@@ -49,12 +45,26 @@ class Evaluation:
     reason: str = ""
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Request:
+    """A pose to be scored; see :meth:`Evaluator.evaluate`.
+
+    ``q`` is empty where the scan configuration is chosen later.
+    """
+
+    grid: Grid
+    pose: Pose
+    q: tuple[float, ...]
+    enough: float
+
+
 class Evaluator:
     """Scores poses exactly; made by :func:`open_evaluator`.
 
     Parameters
     ----------
-    crew : Crew
+    pool : Pool
+    job : Job
     progress : Progress
 
     Attributes
@@ -65,9 +75,9 @@ class Evaluator:
         Poses looked at so far with the bin in the scene.
     """
 
-    def __init__(self, crew: Crew, progress: Progress) -> None:
-        self._crew, self._progress = crew, progress
-        self._known: dict[tuple[float, ...], Evaluation] = {}
+    def __init__(self, pool: Pool, job: Job, progress: Progress) -> None:
+        self._pool, self._job, self._progress = pool, job, progress
+        self._known: dict[Request, Evaluation] = {}
         self._expects = False
         self.cpu_s = 0.0
         self.mapped = 0
@@ -108,33 +118,32 @@ class Evaluator:
         """
         start = np.zeros(0) if q is None else q
         starts = np.broadcast_to(start, (len(poses), start.shape[-1]))
-        keys = [
-            (*grid, enough, *pose, *start.tolist())
+        requests = [
+            Request(grid=grid, pose=pose, q=tuple(start.tolist()), enough=enough)
             for pose, start in zip(poses, starts, strict=True)
         ]
         least = np.broadcast_to(above, len(poses)).tolist()
-        units = {
-            unit_of_numbers([*key, least_of_key]): key
-            for key, least_of_key in dict(zip(keys, least, strict=True)).items()
-            if self._is_open(key, least_of_key)
-        }
-        with closing(self._crew.replies(units)) as replies:
-            for reply in replies:
-                if reply is None:
-                    self._progress.tick()
-                    continue
-                content = json.loads(reply.payload)
-                if reply.failed:
-                    raise EngineError(f"a bin pose failed: {last_line(content)}")
-                self._known[units[reply.unit]] = _evaluation(value_from_json(content))
-                self.cpu_s += reply.measure.cpu_s
-                self.mapped += 1
-                self._progress.add(1, 1)
-        return [self._known[key] for key in keys]
+        units = [
+            (request, least_of_request)
+            for request, least_of_request in dict(
+                zip(requests, least, strict=True)
+            ).items()
+            if self._is_open(request, least_of_request)
+        ]
+        found = compute(
+            self._pool, self._job, units, self._progress, measured=self._count
+        )
+        for (request, _), content in zip(units, found, strict=True):
+            self._known[request] = _evaluation(content)
+        return [self._known[request] for request in requests]
 
-    def _is_open(self, key: tuple[float, ...], above: float) -> bool:
+    def _count(self, reply: Reply) -> None:
+        self.cpu_s += reply.measure.cpu_s
+        self.mapped += 1
+
+    def _is_open(self, request: Request, above: float) -> bool:
         """Whether a pose must be looked at, or looked at again."""
-        known = self._known.get(key)
+        known = self._known.get(request)
         if known is None:
             return True
         return known.score is None and not known.reason and known.bound > above
@@ -144,9 +153,8 @@ class Evaluator:
 def open_evaluator(
     loaded: LoadedCell,
     is_open: BoolArray,
+    options: RunOptions,
     *,
-    workers: int,
-    executor: str,
     progress: Progress,
 ) -> Iterator[Evaluator]:
     """Start workers that score poses, and stop them afterwards.
@@ -156,21 +164,12 @@ def open_evaluator(
     loaded : LoadedCell
     is_open : bool array, shape (layers, y, x, orientations)
         See :func:`reachmap.placement.mapped.sample.open_frames`.
-    workers : int
-    executor : str
+    options : RunOptions
     progress : Progress
     """
-    job = Job(
-        function=evaluate_unit,
-        prepare=Prepared,
-        encode=json_from_value,
-        tally=one_frame,
-        context=(loaded, is_open),
-        packages=package_versions(),
-    )
-    parcel = Parcel(key=secrets.token_hex(16), job=job)
-    with open_lanes(executor, workers, parcel) as lanes, Crew(lanes) as crew:
-        yield Evaluator(crew, progress)
+    job = Job(function=evaluate_unit, prepare=Prepared, context=(loaded, is_open))
+    with open_pool(options) as pool:
+        yield Evaluator(pool, job, progress)
         progress.end()
 
 
@@ -201,14 +200,14 @@ class Prepared:
         return self._placed
 
 
-def evaluate_unit(prepared: Prepared, unit: int) -> dict[str, Any]:
-    """Score one pose; the unit's number says which, see :func:`unit_of_numbers`."""
-    along, across, part, enough, x, y, z, yaw, *rest = numbers_of_unit(unit)
-    placed = prepared.scene_at((x, y, z, yaw), (int(along), int(across), int(part)))
-    q, reason = start_of(placed, np.array(rest[:-1]) if rest[:-1] else None)
+def evaluate_unit(prepared: Prepared, unit: tuple[Request, float]) -> dict[str, Any]:
+    """Score one pose, unless its bound is not above a number [percent]."""
+    request, above = unit
+    placed = prepared.scene_at(request.pose, request.grid)
+    q, reason = start_of(placed, np.array(request.q) if request.q else None)
     if q is None:
         return {"bound": 0.0, "reason": reason, "score": None}
-    bound, score = placed.score_from(q, above=rest[-1], enough=enough)
+    bound, score = placed.score_from(q, above=above, enough=request.enough)
     return {
         "bound": bound,
         "reason": "",
@@ -236,20 +235,6 @@ def start_of(
         return None, f"{checker.body_pairs[pair]} at the scan configuration"
     image = next(imaging_configurations(placed.scene, placed.Q, placed.frame), None)
     return image, UNSEEN if image is None else ""
-
-
-def unit_of_numbers(numbers: Sequence[float]) -> int:
-    """Number of a unit that carries float64 numbers, bit for bit.
-
-    Units are numbered before workers start, and poses come up while they work.
-    """
-    return int.from_bytes(b"\x01" + np.asarray(numbers, ">f8").tobytes(), "big")
-
-
-def numbers_of_unit(unit: int) -> list[float]:
-    """Undo :func:`unit_of_numbers`."""
-    raw = unit.to_bytes((unit.bit_length() + 7) // 8, "big")[1:]
-    return [float(v) for v in np.frombuffer(raw, ">f8")]
 
 
 def _evaluation(content: dict[str, Any]) -> Evaluation:

@@ -7,11 +7,11 @@ from concurrent.futures import BrokenExecutor, Executor, Future
 import pytest
 
 from reachmap.errors import EngineError, IncompleteError, SceneError
-from reachmap.runtime.workers import crew as crew_module
-from reachmap.runtime.workers.crew import Crew, LaneSpec
-from reachmap.runtime.workers.tasks import Parcel, Reply, get_ready
+from reachmap.runtime import pool as pool_module
+from reachmap.runtime.job import Job, Reply, get_ready
+from reachmap.runtime.pool import Pool, Slot
 
-PARCEL = Parcel(key="run", job=None)
+JOB = Job(function=print, context=None)
 
 
 class WorkerKilledError(Exception):
@@ -34,18 +34,9 @@ class Cluster:
         self.started = 0
         self.most_held = 0
 
-    def spec(self, **settings):
-        """The lane of this cluster."""
-        if self.heals:
-            settings["deaths"] = lambda e: 4 if isinstance(e, WorkerKilledError) else 0
-        return LaneSpec(
-            start=lambda: Scripted(self),
-            stop=lambda executor: self.pending.clear(),
-            parcel=PARCEL,
-            label=PARCEL,
-            window=lambda: 4 * self.width,
-            **settings,
-        )
+    def slot(self, *, narrow=False, lost=None):
+        """The slot of this cluster."""
+        return ClusterSlot(self, narrow=narrow, lost=lost)
 
     def step(self):
         """Let every worker finish one unit, or die of it."""
@@ -57,7 +48,7 @@ class Cluster:
         for future, unit in crowd:
             if not deadly:
                 self.done.append(unit)
-                future.set_result(Reply(unit=unit, payload=str(unit)))
+                future.set_result(Reply(index=unit, text=str(unit)))
             elif self.heals:
                 future.set_exception(WorkerKilledError(unit))
             else:
@@ -68,6 +59,31 @@ class Cluster:
             self.pending = []
 
 
+class ClusterSlot(Slot):
+    """A slot of several workers, or of one."""
+
+    def __init__(self, cluster, *, narrow, lost):
+        super().__init__(lambda: Scripted(cluster))
+        self.cluster, self.lost = cluster, lost
+        self.is_wide = not narrow
+
+    def window(self):
+        """Room for a few units each."""
+        return 4 * self.cluster.width if self.is_wide else 1
+
+    def stop(self, executor):
+        """Forget everything."""
+        self.cluster.pending.clear()
+
+    def is_lost(self, error):
+        """By default when it is broken."""
+        return super().is_lost(error) if self.lost is None else self.lost(error)
+
+    def deaths(self, error):
+        """What a cluster that heals itself says."""
+        return 4 if isinstance(error, WorkerKilledError) else 0
+
+
 class Scripted(Executor):
     """Submits to a cluster."""
 
@@ -75,13 +91,13 @@ class Scripted(Executor):
         self.cluster = cluster
         cluster.started += 1
 
-    def submit(self, fn, /, parcel, *unit):
+    def submit(self, fn, /, ticket, *unit):
         """Keep the unit until the next step; workers are always ready."""
         future = Future()
         if fn is get_ready:
             future.set_result(1)
         else:
-            self.cluster.pending.append((future, *unit))
+            self.cluster.pending.append((future, unit[0]))
             held = len(self.cluster.pending)
             self.cluster.most_held = max(self.cluster.most_held, held)
         return future
@@ -89,19 +105,20 @@ class Scripted(Executor):
 
 @pytest.fixture(autouse=True)
 def _quick(monkeypatch):
-    monkeypatch.setattr(crew_module, "TICK_S", 0.0005)
+    monkeypatch.setattr(pool_module, "TICK_S", 0.0005)
 
 
 def run(cluster, units, **settings):
     """Replies by unit."""
     replies = {}
-    with Crew([cluster.spec(**settings)]) as crew:
-        for reply in crew.replies(range(units)):
+    slot = cluster.slot(**settings)
+    with Pool(lambda units, most: [slot]) as pool:
+        for reply in pool.replies(JOB, dict.fromkeys(range(units))):
             if reply is None:
                 cluster.step()
             else:
-                assert reply.unit not in replies
-                replies[reply.unit] = reply
+                assert reply.index not in replies
+                replies[reply.index] = reply
     return replies
 
 
@@ -121,9 +138,9 @@ def test_the_window_bounds_what_is_in_flight():
 def test_a_lane_in_order_blames_the_unit_it_was_on():
     """One worker: the oldest unit is the one, with three strikes and no other tries."""
     cluster = Cluster(1, poison={3, 7})
-    replies = run(cluster, 10, in_order=True)
+    replies = run(cluster, 10, narrow=True)
     assert failed(replies) == [3, 7]
-    assert replies[3].payload == '"killed 3 workers"'
+    assert replies[3].text == '"killed 3 workers"'
     assert cluster.killed == {3: 3, 7: 3}
     assert sorted(cluster.done) == [0, 1, 2, 4, 5, 6, 8, 9]
 
@@ -131,7 +148,7 @@ def test_a_lane_in_order_blames_the_unit_it_was_on():
 def test_a_worker_that_dies_once_loses_nothing():
     """A single death is a retry, not an error."""
     cluster = Cluster(1, moody={0, 4, 9})
-    assert failed(run(cluster, 10, in_order=True)) == []
+    assert failed(run(cluster, 10, narrow=True)) == []
     assert sorted(cluster.done) == list(range(10))
     assert cluster.started == 4
 
@@ -149,14 +166,14 @@ def test_workers_killed_from_outside_are_no_fault_of_the_units():
 
     for _ in range(20):
         cluster = Stormy(1)
-        assert failed(run(cluster, 100, in_order=True)) == []
+        assert failed(run(cluster, 100, narrow=True)) == []
         assert max(cluster.killed.values()) >= 2
 
 
 def test_a_poisoned_unit_is_found_among_deaths_from_outside():
     """It takes longer, and it ends."""
     cluster = Cluster(1, poison={5}, moody=set(range(6, 30)))
-    replies = run(cluster, 40, in_order=True)
+    replies = run(cluster, 40, narrow=True)
     assert failed(replies) == [5]
     assert cluster.killed[5] == 12
 
@@ -193,14 +210,7 @@ def test_workers_that_die_while_getting_ready_are_replaced():
                 super().step()
 
     cluster = Forgetful(2)
-    spec = cluster.spec(lost=lambda error: isinstance(error, LookupError))
-    replies = {}
-    with Crew([spec]) as crew:
-        for reply in crew.replies(range(20)):
-            if reply is None:
-                cluster.step()
-            else:
-                replies[reply.unit] = reply
+    replies = run(cluster, 20, lost=lambda error: isinstance(error, LookupError))
     assert sorted(replies) == list(range(20))
     assert failed(replies) == []
     assert cluster.started == 4
@@ -221,7 +231,7 @@ def test_a_broken_executor_that_finished_units_is_believed():
                 self.pending[0][0].set_exception(BrokenExecutor("died"))
                 future, unit = self.pending[1]
                 self.done.append(unit)
-                future.set_result(Reply(unit=unit, payload="1"))
+                future.set_result(Reply(index=unit, text="1"))
             else:
                 super().step()
 
@@ -238,22 +248,13 @@ def test_workers_that_never_start_end_the_run():
             raise BrokenExecutor("died at once")
 
     cluster = Cluster(1)
-    spec = LaneSpec(
-        start=lambda: Dead(cluster),
-        stop=lambda executor: None,
-        parcel=PARCEL,
-        label=PARCEL,
-        window=lambda: 2,
-        in_order=True,
-    )
+    slot = Slot(lambda: Dead(cluster))
     with (
-        pytest.raises(
-            EngineError, match=r"died 20 times before their first unit.*-j 1"
-        ),
-        Crew([spec]) as crew,
+        pytest.raises(EngineError, match=r"died 3 times before their first unit.*-j 1"),
+        Pool(lambda units, most: [slot]) as pool,
     ):
-        list(crew.replies(range(3)))
-    assert cluster.started == 20
+        list(pool.replies(JOB, {0: "a", 1: "b"}))
+    assert cluster.started == 3
 
 
 @pytest.mark.parametrize(
@@ -268,7 +269,8 @@ def test_an_exception_of_the_executor_ends_the_run(error, kind, said):
 
     class Failing(Cluster):
         def step(self):
-            self.pending[0][0].set_exception(error)
+            if self.pending:
+                self.pending[0][0].set_exception(error)
 
     with pytest.raises(kind, match=said):
         run(Failing(1), 3)

@@ -1,4 +1,4 @@
-"""Journals that were cut, flipped, spliced and shuffled are never read wrongly."""
+"""Stores that were cut, flipped, spliced and shuffled are never read wrongly."""
 
 from __future__ import annotations
 
@@ -11,15 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from reachmap.errors import MapFileError
-from reachmap.runtime.journal.entries import read_journal
-from reachmap.runtime.journal.format import (
-    Header,
-    Measure,
-    checksum,
-    record_line,
-    seal,
-)
-from reachmap.runtime.journal.journal import open_journal
+from reachmap.runtime.job import Measure, Reply
+from reachmap.runtime.journal import PREFIX, Header, read_store, seal
+from reachmap.runtime.store import open_store
 
 UNITS = 12
 HEADER = Header(
@@ -32,21 +26,37 @@ HEADER = Header(
 OTHER = Header(kind="toy", units=UNITS, shard=(1, 1), settings={"seed": 2}, document={})
 
 
+def checksum(line):
+    """CRC that a line claims."""
+    return int(line[: PREFIX - 1], 16)
+
+
+def record_line(unit, text, *, word, measure, seed):
+    """Sealed line of a unit, as the module of the format says."""
+    return seal(
+        f'{{"phase":"units","unit":{unit},"ok":{measure.ok},'
+        f'"frames":{measure.frames},"wall_s":{measure.wall_s:.3f},'
+        f'"cpu_s":{measure.cpu_s:.3f},"{word}":{text}}}'.encode(),
+        seed,
+    )
+
+
 def body(header):
-    """A whole journal, with an error that a later result replaces."""
+    """A whole store, with a unit that failed."""
     seed = checksum(header.line())
-    lines = [header.line()]
+    lines = [header.line(), b"\n", header.line(), b"\n"]
     for unit in (3, 0, 1, 2, 7, 5, 4, 11, 6):
         lines.append(
             record_line(
                 unit,
                 json.dumps(meaning(unit), separators=(",", ":")),
-                failed=False,
+                word="result",
                 measure=Measure(ok=unit, frames=27, wall_s=0.5, cpu_s=0.25),
                 seed=seed,
             )
         )
-    error = record_line(8, '"broke"', failed=True, measure=Measure(), seed=seed)
+        lines.append(b"\n")
+    error = record_line(8, '"broke"', word="error", measure=Measure(), seed=seed)
     return b"".join([*lines, error])
 
 
@@ -62,15 +72,12 @@ def check_reading(path, data):
     """Read a mutated journal: what is read is right, or the refusal is clean."""
     path.write_bytes(data)
     try:
-        with read_journal(path) as entries:
+        with read_store(path) as entries:
             assert entries.header in (HEADER, OTHER)
-            for unit, record in entries.results.items():
+            for unit, measure in entries.results().items():
                 assert entries.payload(unit) == meaning(unit)
-                assert record.measure == Measure(
-                    ok=unit, frames=27, wall_s=0.5, cpu_s=0.25
-                )
-            for unit in entries.failed:
-                assert (unit, entries.error(unit)) == (8, "broke")
+                assert measure == Measure(ok=unit, frames=27, wall_s=0.5, cpu_s=0.25)
+            assert entries.failed() in ({}, {8: "broke"})
     except MapFileError:
         return "refused"
     return "read"
@@ -80,15 +87,15 @@ def check_resuming(path, data):
     """Resume a mutated journal: afterwards every unit is there and right."""
     path.write_bytes(data)
     try:
-        with open_journal(path, HEADER) as journal:
+        with open_store(path, HEADER) as journal:
             for unit in range(UNITS):
-                if unit not in journal.entries.results:
-                    journal.append(unit, json.dumps(meaning(unit)))
+                if unit not in journal.results():
+                    journal.put(Reply(index=unit, text=json.dumps(meaning(unit))))
     except MapFileError:
         assert path.read_bytes() == data
         return "refused"
-    with read_journal(path) as entries:
-        found = {unit: entries.payload(unit) for unit in entries.results}
+    with read_store(path) as entries:
+        found = {unit: entries.payload(unit) for unit in entries.results()}
     assert found == {unit: meaning(unit) for unit in range(UNITS)}
     return "resumed"
 
@@ -183,7 +190,7 @@ def test_hostile_headers(scratch, changes):
     """A header with right sum and wrong contents is refused, or is well formed."""
     data = json.loads(HEADER.line()[9:]) | changes
     scratch.write_bytes(seal(json.dumps(data).encode()))
-    with suppress(MapFileError), read_journal(scratch) as entries:
+    with suppress(MapFileError), read_store(scratch) as entries:
         header = entries.header
         assert header.units >= 1
         assert 1 <= header.shard[0] <= header.shard[1]
@@ -197,9 +204,9 @@ def test_hostile_lines(scratch, line, unit):
     seed = checksum(HEADER.line())
     forged = [
         seal(line.replace(b"\n", b""), seed),
-        seal(b'{"unit":%d,"ok":1,"frames":1,"result":1}' % unit, seed),
+        seal(b'{"phase":"units","unit":%d,"ok":1,"frames":1,"result":1}' % unit, seed),
         seal(
-            b'{"unit":%d,"ok":1,"frames":1,"wall_s":0.000,"cpu_s":0.000,"result":1}'
+            b'{"phase":"units","unit":%d,"ok":1,"frames":1,"wall_s":0.000,"cpu_s":0.000,"result":1}'
             % (unit + UNITS if unit >= 0 else unit),
             seed,
         ),

@@ -1,1 +1,0 @@
-"""The file that finished units are kept in until the artefact is written."""

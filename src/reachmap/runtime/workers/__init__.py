@@ -1,1 +1,0 @@
-"""Processes that do the units, and what happens when one dies."""
