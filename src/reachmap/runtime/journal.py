@@ -30,6 +30,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, PositiveInt, ValidationError
 
 from reachmap.errors import MapFileError
+from reachmap.maps.bytes.to_json import flat_json
 from reachmap.runtime.encoding import Json, decode, encode
 from reachmap.runtime.job import Measure
 
@@ -112,9 +113,6 @@ def differences(old: Header, new: Header) -> list[str]:
     """Name what differs between two headers: ``seed 1 → 2``."""
     if encode(old.identity()) == encode(new.identity()):
         return []
-    # Imported here: it is needed for a refusal alone.
-    from reachmap.maps.comparison.comparison import flat_json
-
     before, after = dict(flat_json(old.identity())), dict(flat_json(new.identity()))
     keys = [*before, *(key for key in after if key not in before)]
     return [
