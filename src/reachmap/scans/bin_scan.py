@@ -228,36 +228,24 @@ def grasp_grid(scene: Scene) -> FrameGrid:
 
 def planning_job(scene: Scene, stages: Stages) -> Job:
     """Survey the test grasps and connect them; what is left is to plan to each."""
-    spec = scene.loaded.cell.bin_scan
+    loaded, cell = scene.loaded, scene.loaded.cell
     context = SurveyContext(
-        loaded=scene.loaded,
+        loaded=loaded,
         with_bin=True,
         grids=(grasp_grid(scene),),
-        approach_m=spec.approach_distance_m,
+        approach_m=cell.bin_scan.approach_distance_m,
     )
     survey = survey_in_stages(context, stages)
 
     def connect(progress: Progress) -> BoolArray:
-        connection = connect_survey(
-            scene,
-            survey,
-            seed=scene.loaded.cell.seed,
-            progress=progress,
-        )
+        connection = connect_survey(scene, survey, seed=cell.seed, progress=progress)
         connected = np.zeros(len(survey.status), bool)
         connected[connection.roadmap.frames_reached()] = True
         return connected
 
-    return Job(
-        function=plan_unit,
-        prepare=prepare,
-        context=BinContext(
-            loaded=scene.loaded,
-            survey=survey,
-            connected=stages.once("connect", connect),
-        ),
-        tally=tally,
-    )
+    connected = stages.once("connect", connect)
+    whole = BinContext(loaded=loaded, survey=survey, connected=connected)
+    return Job(function=plan_unit, prepare=prepare, context=whole, tally=tally)
 
 
 def prepare(context: BinContext) -> tuple[BinContext, Scene]:
