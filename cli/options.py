@@ -277,6 +277,31 @@ FORMATS = (
     "suction-point-first",
 )
 
+
+class ShareType(click.ParamType):  # type: ignore[type-arg, unused-ignore]
+    """A number, or a percentage: (20, False) for ``20``, (20, True) for ``20%``."""
+
+    name = "share"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[float, bool]:
+        """Read one; click reports what is none."""
+        if isinstance(value, tuple):
+            return value
+        text = str(value).strip()
+        percent = text.endswith("%")
+        try:
+            number = float(text.removesuffix("%"))
+        except ValueError:
+            number = -1.0
+        if not 0 <= number < (100.1 if percent else 1e9):
+            self.fail(f"{value!r} is neither a number of grasps nor a percentage")
+        return number, percent
+
+
+SHARE = ShareType()
+
 list_options = compose(
     click.option(
         "--weights",
@@ -325,6 +350,13 @@ list_options = compose(
         show_default=True,
         help="Whether the roll about the approach counts. As given: it is free for "
         "grasps with a direction and fixed for those with an orientation.",
+    ),
+    click.option(
+        "--max-angle",
+        type=click.FloatRange(0, 180, min_open=True),
+        metavar="DEG",
+        help="Grasps turned further than this from every orientation of the map are "
+        "unlike_map; default: 1.5 times the spacing of its orientations.",
     ),
     click.option(
         "--from",

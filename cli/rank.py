@@ -63,6 +63,17 @@ AXES = ("+x", "-x", "+y", "-y", "+z", "-z")
     show_default=True,
     help="How many of the first grasps the chart averages.",
 )
+@click.option(
+    "--min-reachable",
+    type=options.SHARE,
+    metavar="N|P%",
+    help="Exit with 1 if a list has fewer reachable grasps: a number, or a percentage.",
+)
+@click.option(
+    "--fail-if-none-reachable",
+    is_flag=True,
+    help="Exit with 1 if a list has no reachable grasp.",
+)
 @options.overwrite_option
 def command(
     grasps: tuple[str, ...],
@@ -74,6 +85,7 @@ def command(
     planning_time: Literal["checks", "measured"],
     neighbours: int,
     roll: Literal["as-given", "free", "fixed"],
+    max_angle: float | None,
     format_name: str | None,
     frame: str | None,
     frame_pose: tuple[float, ...] | None,
@@ -85,6 +97,8 @@ def command(
     explain: str | None,
     chart: Path | None,
     chart_top: int,
+    min_reachable: tuple[float, bool] | None,
+    fail_if_none_reachable: bool,
     overwrite: bool,
 ) -> None:
     """Re-order grasp lists by cost, using the bin map alone.
@@ -110,7 +124,11 @@ def command(
         map_path=map_path,
         output=None if to_stdout else output,
         settings=RankSettings(
-            weights=weights, likeness=likeness, neighbours=neighbours, roll=roll
+            weights=weights,
+            likeness=likeness,
+            neighbours=neighbours,
+            roll=roll,
+            max_angle_deg=max_angle,
         ),
         basis=CostBasis(normalise=normalise, planning_time=planning_time),
         list_format=ListFormat(
@@ -132,6 +150,11 @@ def command(
         answer.text if to_stdout else ranking_tables(answer.ranked, top)
     )
     click.echo(text.rstrip("\n"))
+    if min_reachable is not None:
+        number, percent = min_reachable
+        answer.require_reachable(number, percent=percent)
+    if fail_if_none_reachable:
+        answer.require_reachable(1)
 
 
 def _check_options(

@@ -69,6 +69,7 @@ def command(
     likeness: float,
     normalise: Literal["quantile", "max"],
     planning_time: Literal["checks", "measured"],
+    max_angle: float | None,
     neighbours: int,
     roll: Literal["as-given", "free", "fixed"],
     format_name: str | None,
@@ -111,7 +112,11 @@ def command(
         grasps,
         random=random,
         settings=RankSettings(
-            weights=weights, likeness=likeness, neighbours=neighbours, roll=roll
+            weights=weights,
+            likeness=likeness,
+            neighbours=neighbours,
+            roll=roll,
+            max_angle_deg=max_angle,
         ),
         basis=CostBasis(normalise=normalise, planning_time=planning_time),
         list_format=ListFormat(name=format_name, frame=frame),

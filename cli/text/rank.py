@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from reachmap.ranking.answers.ranked_list import RankedList, quadrant_ranks, status_name
+from reachmap.ranking.answers.ranked_list import RankedList, quadrant_ranks
+from reachmap.ranking.lookup.order import status_name
 from reachmap.text import printable
 
 TABLE_ROWS = 10

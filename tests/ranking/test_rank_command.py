@@ -57,7 +57,7 @@ def test_every_result_has_the_fields_of_the_contract(folder):
     states = set()
     for grasp in ranked("pile-1.json")["grasps"]:
         result = grasp["reachmap"]
-        assert set(result) == keys
+        assert set(result) - {"extrapolated"} == keys
         states.add(result["status"])
         if result["cost"] is None:
             assert result["terms"] is None
@@ -213,7 +213,7 @@ def test_a_list_wholly_outside_is_questioned(folder):
     (folder / "base.json").write_text(json.dumps({**data, "frame": "robot_base"}))
     result = run("base.json")
     assert result.exit_code == 0
-    assert "no grasp lies in the mapped volume" in result.stderr
+    assert "are the frame (robot_base) and the map right?" in result.stderr
     assert json.loads(result.stdout)["reachmap"]["counts"] == {"outside_map": 167}
 
 

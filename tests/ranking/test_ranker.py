@@ -358,15 +358,15 @@ def test_a_list_ranks_as_its_grasps_do_alone(seed):
     ("arguments", "message"),
     [
         ({"points": np.zeros((2, 2))}, r"points must have the shape \('n', 3\)"),
-        ({"points": np.full((2, 3), np.nan)}, "points must be finite"),
-        ({"directions": np.zeros((2, 3))}, "directions must be finite and longer"),
+        ({"points": np.full((2, 3), np.nan)}, "rows 0, 1: expected finite points"),
+        ({"directions": np.zeros((2, 3))}, "finite directions longer than 0"),
         ({"directions": np.ones((3, 3))}, r"directions must have the shape \(2, 3\)"),
         ({"directions": None}, "give directions or rotations"),
-        ({"rotations": np.ones((2, 3, 3))}, "rotations must be orthonormal"),
-        ({"rotations": -np.tile(np.eye(3), (2, 1, 1))}, "determinant"),
+        ({"rotations": np.ones((2, 3, 3))}, "orthonormal rotations"),
+        ({"rotations": -np.tile(np.eye(3), (2, 1, 1))}, "determinant \\+1"),
         (
             {"directions": None, "rotations": np.full((2, 3, 3), np.nan)},
-            "rotations that are NaN need directions",
+            "rows 0, 1",
         ),
         ({"weights": (1.0, -1.0, 0.0)}, "weight beta must be between 0"),
         ({"weights": (1.0, np.nan, 0.0)}, "weight beta must be between 0"),
@@ -381,7 +381,7 @@ def test_wrong_arguments(arguments, message):
     """Shapes, numbers and settings that do not fit are named."""
     given_ = {"points": np.zeros((2, 3)), "directions": np.ones((2, 3)), **arguments}
     with pytest.raises(SettingsError, match=message):
-        RANKER.rank(**given_)
+        RANKER.rank(**given_, invalid="raise")
 
 
 @pytest.mark.parametrize(

@@ -77,7 +77,7 @@ def test_rankings_agree_with_the_loops(roll, part):
         v = directions_of(R, bin_map.approach_axis)
         weights = tuple(rng.choice([0.25, 0.5, 1.0, 2.0], size=3) * (1.0, 0.0, 1.0))
         given = {"directions": v} if roll == "free" else {"rotations": R}
-        # The oracle knows no outside: the volume check is tested by itself.
+        # The oracle knows neither outside nor unlike: both are tested by themselves.
         ranking = _without_outside(ranker, p, weights, **given)
         order, costs, matches = oracle.rank(
             p, v, None if roll == "free" else R, weights
@@ -90,4 +90,4 @@ def test_rankings_agree_with_the_loops(roll, part):
 def _without_outside(ranker, p, weights, **given):
     nowhere = np.zeros(len(p), bool)
     with mock.patch("reachmap.ranking.lookup.ranker.outside_map", return_value=nowhere):
-        return ranker.rank(p, weights=weights, **given)
+        return ranker.rank(p, weights=weights, max_angle_deg=180.0, **given)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from reachmap.errors import MapFileError, SettingsError
+from reachmap.errors import GateFailedError, MapFileError, SettingsError
 from reachmap.maps import read_bin_map
 from reachmap.maps.bytes.publish import check_outputs, check_picture, publish
 from reachmap.maps.records import BinMap
@@ -23,7 +23,6 @@ from reachmap.ranking.answers.ranked_list import (
 )
 from reachmap.ranking.lists.arrays import GraspList
 from reachmap.ranking.lists.reading import STDIN, read_grasps
-from reachmap.ranking.lookup.order import OUTSIDE_MAP
 from reachmap.ranking.lookup.ranker import Ranker
 from reachmap.ranking.lookup.settings import CostBasis, RankSettings
 
@@ -74,6 +73,25 @@ class RankAnswer:
     ranked: tuple[RankedList, ...]
     explanation: str = ""
     written: tuple[Path, ...] = ()
+
+    def require_reachable(self, number: float, *, percent: bool = False) -> None:
+        """Raise GateFailedError if a list has fewer reachable grasps than asked for.
+
+        Parameters
+        ----------
+        number : float
+            Least number of reachable grasps of each list, or their least percentage.
+        percent : bool
+        """
+        for one in self.ranked:
+            reached, total = int(one.ranking.reachable.sum()), len(one.grasps)
+            share = 100.0 * reached / total if total else 0.0
+            if (share if percent else reached) < number:
+                wanted = f"{number:g} %" if percent else f"{number:g}"
+                raise GateFailedError(
+                    f"{one.grasps.source}: {reached} of {total} grasps are reachable "
+                    f"({share:.1f} %), which is below {wanted}"
+                )
 
 
 def rank(
@@ -227,13 +245,8 @@ def _rank_one(
     numbers = list_format.frame_pose
     T = None if numbers is None else pose_from_numbers(numbers)
     ranked = rank_list(grasps, ranker, settings=settings, T_base_frame=T)
-    if len(grasps) and (ranked.ranking.status == OUTSIDE_MAP).all():
-        logger.warning(
-            "%s: no grasp lies in the mapped volume; are the frame (%s) and the units "
-            "right?",
-            grasps.source,
-            grasps.frame,
-        )
+    for doubt in ranked.doubts:
+        logger.warning("%s: %s", grasps.source, doubt)
     return ranked
 
 

@@ -9,9 +9,9 @@ import numpy as np
 from reachmap._typing import FloatArray
 from reachmap.errors import SettingsError
 from reachmap.maps.records import BinMap, Status
-from reachmap.ranking.answers.ranked_list import RankedList, quadrant_ranks, status_name
+from reachmap.ranking.answers.ranked_list import RankedList, quadrant_ranks
 from reachmap.ranking.lookup.matching import Queries
-from reachmap.ranking.lookup.order import OUTSIDE_MAP
+from reachmap.ranking.lookup.order import OUTSIDE_MAP, UNLIKE_MAP, status_name
 from reachmap.ranking.lookup.ranker import Ranker
 from reachmap.text import printable
 
@@ -70,6 +70,8 @@ def explanation(ranked: RankedList, row: int, ranker: Ranker, bin_map: BinMap) -
     ]
     if ranked.ranking.status[row] == OUTSIDE_MAP:
         parts.append(("cost", "none: the map says nothing about this place"))
+    elif ranked.ranking.status[row] == UNLIKE_MAP:
+        parts.append(("cost", "none: no orientation of the map is near enough"))
     else:
         parts += [
             ("attempts", _attempts_line(ranked, row, ranker, bin_map)),

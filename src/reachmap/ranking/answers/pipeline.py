@@ -11,9 +11,11 @@ from reachmap import __version__
 from reachmap._typing import FloatArray
 from reachmap.errors import SettingsError
 from reachmap.geometry import rotation_from_quaternion_wxyz, transform_from_parts
+from reachmap.ranking.answers.doubts import list_doubts
 from reachmap.ranking.answers.ranked_list import RankedList
 from reachmap.ranking.lists.arrays import GraspList
 from reachmap.ranking.lookup.frames import place_grasps
+from reachmap.ranking.lookup.matching import Queries
 from reachmap.ranking.lookup.queries import queries_from_arrays
 from reachmap.ranking.lookup.ranker import Ranker
 from reachmap.ranking.lookup.settings import RankSettings
@@ -43,21 +45,32 @@ def rank_list(
         The list is in an unknown frame.
     """
     settings = settings or RankSettings()
-    axis = ranker.table.approach_axis
-    placed = place_grasps(grasps, ranker.frames, axis, T_base_frame)
-    queries = queries_from_arrays(
-        ranker.table,
-        placed.points,
-        placed.directions,
-        placed.rotations,
-        roll=settings.roll,
-    )
+
+    def queries_of(one: GraspList) -> Queries:
+        axis = ranker.table.approach_axis
+        placed = place_grasps(one, ranker.frames, axis, T_base_frame)
+        return queries_from_arrays(
+            ranker.table,
+            placed.points,
+            placed.directions,
+            placed.rotations,
+            roll=settings.roll,
+            invalid=settings.invalid,
+        )
+
+    queries = queries_of(grasps)
+    ranking = ranker.rank_queries(queries, settings, grasps.scores)
     return RankedList(
         grasps=grasps,
         queries=queries,
-        ranking=ranker.rank_queries(queries, settings, grasps.scores),
+        ranking=ranking,
         settings=_header(ranker, settings),
         with_likeness=settings.likeness > 0,
+        doubts=list_doubts(
+            grasps,
+            ranking,
+            lambda other: ranker.rank_queries(queries_of(other), settings),
+        ),
     )
 
 
@@ -74,6 +87,7 @@ def _header(ranker: Ranker, settings: RankSettings) -> Mapping[str, Any]:
         "likeness": settings.likeness,
         "neighbours": settings.neighbours,
         "roll": settings.roll,
+        "max_angle_deg": settings.max_angle_deg,
         "normalise": table.basis.normalise,
         "planning_time": table.basis.planning_time,
         "scale": scale,

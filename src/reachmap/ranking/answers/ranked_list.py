@@ -11,10 +11,9 @@ from typing import Any
 import numpy as np
 
 from reachmap._typing import FloatArray
-from reachmap.maps.records import Status
 from reachmap.ranking.lists.arrays import GraspList
 from reachmap.ranking.lookup.matching import Queries
-from reachmap.ranking.lookup.order import OUTSIDE_MAP, Ranking
+from reachmap.ranking.lookup.order import INVALID, OUTSIDE_MAP, Ranking, status_name
 from reachmap.ranking.lookup.table import TERMS
 
 TERM_NAMES = (*TERMS, "likeness")
@@ -35,6 +34,8 @@ class RankedList:
         What it was ranked with; written to the document.
     with_likeness : bool
         Whether the likeness term takes part in the cost.
+    doubts : tuple of str
+        Questions that the list as a whole raises.
     """
 
     grasps: GraspList
@@ -42,17 +43,13 @@ class RankedList:
     ranking: Ranking
     settings: Mapping[str, Any]
     with_likeness: bool = False
+    doubts: tuple[str, ...] = ()
 
     def counts(self) -> dict[str, int]:
         """How many grasps ended in which status, most frequent first."""
         codes, numbers = np.unique(self.ranking.status, return_counts=True)
         found = {status_name(c): int(n) for c, n in zip(codes, numbers, strict=True)}
         return dict(sorted(found.items(), key=lambda item: (-item[1], item[0])))
-
-
-def status_name(code: int) -> str:
-    """Name of a status code as files have it, ``path_found`` for one."""
-    return "outside_map" if code == OUTSIDE_MAP else Status(int(code)).name.lower()
 
 
 def quadrant_ranks(
@@ -84,7 +81,11 @@ def ranked_document(ranked: RankedList, top: int | None = None) -> dict[str, Any
     supplied = document.pop("grasps")
     order = ranked.ranking.order[:top].tolist()
     results = _results(ranked)
-    document["reachmap"] = {**ranked.settings, "counts": ranked.counts()}
+    document["reachmap"] = {
+        **ranked.settings,
+        "counts": ranked.counts(),
+        "doubts": list(ranked.doubts),
+    }
     document["grasps"] = [{**supplied[row], "reachmap": results[row]} for row in order]
     return document
 
@@ -119,6 +120,7 @@ def _results(ranked: RankedList) -> list[dict[str, Any]]:
         ranking.distance.tolist(),
         ranking.angle.tolist(),
         ranking.orientation_wxyz.tolist(),
+        ranking.extrapolated.tolist(),
         strict=True,
     )
     count = 4 if ranked.with_likeness else 3
@@ -126,9 +128,9 @@ def _results(ranked: RankedList) -> list[dict[str, Any]]:
 
 
 def _result(supplied: int, count: int, values: tuple[Any, ...]) -> dict[str, Any]:
-    rank, after, before, cost, terms, code, test_grasp, phi1, phi2, wxyz = values
+    rank, after, before, cost, terms, code, test_grasp, phi1, phi2, wxyz, far = values
     reachable = bool(np.isfinite(cost))
-    inside = code != OUTSIDE_MAP
+    inside = code not in (OUTSIDE_MAP, INVALID)
     quadrant = {"quadrant_rank": after, "original_quadrant_rank": before}
     named = dict(zip(TERM_NAMES[:count], terms[:count], strict=True))
     return {
@@ -140,9 +142,10 @@ def _result(supplied: int, count: int, values: tuple[Any, ...]) -> dict[str, Any
         "status": status_name(code),
         "test_grasp": test_grasp[1:] if inside else None,
         "layer": test_grasp[0] if inside else None,
-        "distance": phi1,
-        "angle": phi2,
+        "distance": None if code == INVALID else phi1,
+        "angle": None if code == INVALID else phi2,
         "orientation_wxyz": wxyz if reachable else None,
+        **({"extrapolated": True} if far else {}),
     }
 
 

@@ -20,6 +20,7 @@ from reachmap.ranking.lookup.matching import (
     match_at,
     worth_of,
 )
+from reachmap.ranking.lookup.settings import ALIKE_STEPS
 from reachmap.ranking.lookup.table import GraspTable
 
 # Beyond half a grid diagonal sideways, and so far above or below the layers: grasp
@@ -65,6 +66,28 @@ def outside_map(points: FloatArray, nearest: IntArray, table: GraspTable) -> Boo
     low = max(float(table.layers[0]) - margin, -BOTTOM_TOLERANCE_M)
     high = float(table.layers[-1]) + margin
     return np.asarray((sideways > reach) | (p[:, 2] < low) | (p[:, 2] > high))
+
+
+def unlike_map(
+    matches: Matches, free: BoolArray, table: GraspTable, max_angle_deg: float | None
+) -> BoolArray:
+    """Which grasps are turned too far from every orientation of the map, shape (n,).
+
+    Too far is more than ``max_angle_deg``, or than 1.5 times the greatest angle between
+    neighbouring orientations (of approach axes where the roll is free).
+    """
+    if max_angle_deg is not None:
+        return np.asarray(matches.angle > np.radians(max_angle_deg))
+    spacing = np.where(free, table.spacing_rad[0], table.spacing_rad[1])
+    return np.asarray(matches.angle > ALIKE_STEPS * spacing)
+
+
+def beyond_points(points: FloatArray, table: GraspTable) -> BoolArray:
+    """Which grasps lie sideways of all test points, where costs extrapolate, (n,)."""
+    p = points @ table.T_bin_base[:3, :3].T + table.T_bin_base[:3, 3]
+    low, high = table.bin_points.min(axis=0), table.bin_points.max(axis=0)
+    slack = MIN_DISTANCE_M
+    return np.asarray(((p < low - slack) | (p > high + slack))[:, :2].any(axis=1))
 
 
 def likeness_terms(matches: Matches, free: BoolArray, table: GraspTable) -> FloatArray:

@@ -89,12 +89,15 @@ class Queries:
         Unit; read only where the roll is not free.
     free : bool array, shape (n,)
         Whether the roll about the approach is left out of the comparison.
+    valid : bool array, shape (n,)
+        Whether the row is a grasp at all; the others hold stand-ins.
     """
 
     points: FloatArray
     axes: FloatArray
     quaternions: FloatArray
     free: BoolArray
+    valid: BoolArray
 
     def __len__(self) -> int:
         return len(self.points)
@@ -106,6 +109,7 @@ class Queries:
             axes=self.axes[rows],
             quaternions=self.quaternions[rows],
             free=self.free[rows],
+            valid=self.valid[rows],
         )
 
 

@@ -6,11 +6,20 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from reachmap._typing import BoolArray, CodeArray, FloatArray, IntArray
-from reachmap.maps.records import freeze
+from reachmap.maps.records import Status, freeze
 
 OUTSIDE_MAP: Final = 254
+UNLIKE_MAP: Final = 253
+INVALID: Final = 252
+UNMATCHED: Final = {
+    OUTSIDE_MAP: "outside_map",
+    UNLIKE_MAP: "unlike_map",
+    INVALID: "invalid",
+}
+"""States of grasps that the map says nothing about, beside those of test grasps."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -27,14 +36,18 @@ class Ranking:
     terms : array, shape (n, 4)
         α φ3, β φ4, δ φ5, ε φ6, which add up to J; NaN where unreachable.
     status : uint8 array, shape (n,)
-        :class:`reachmap.maps.records.Status` of the test grasp, or ``OUTSIDE_MAP``.
+        :class:`reachmap.maps.records.Status` of the test grasp, or ``OUTSIDE_MAP``
+        (too far from the test points), ``UNLIKE_MAP`` (no orientation is near enough)
+        or ``INVALID`` (not finite, no direction, no rotation).
     test_grasp : int array, shape (n, 4)
-        Layer, y, x, orientation of the nearest test grasp.
+        Layer, y, x, orientation of the nearest test grasp; -1 where invalid.
     distance : array, shape (n,)
         φ1 [m].
     angle : array, shape (n,)
         φ2 [rad]; between approach axes where the roll is free.
     roll_free : bool array, shape (n,)
+    extrapolated : bool array, shape (n,)
+        Beyond the outermost test points, where the map continues what it knows.
     orientation_wxyz : array, shape (n, 4)
         R_test of the test grasp in robot_base: the tool orientation to use.
     """
@@ -47,6 +60,7 @@ class Ranking:
     distance: FloatArray
     angle: FloatArray
     roll_free: BoolArray
+    extrapolated: BoolArray
     orientation_wxyz: FloatArray
 
     def __post_init__(self) -> None:
@@ -65,7 +79,12 @@ class Ranking:
         return np.isfinite(self.cost)
 
 
-def stable_order(cost: FloatArray, scores: FloatArray | None = None) -> IntArray:
+def status_name(code: int) -> str:
+    """Name of a status code as files have it, ``path_found`` for one."""
+    return UNMATCHED.get(int(code)) or Status(int(code)).name.lower()
+
+
+def stable_order(cost: FloatArray, scores: ArrayLike | None = None) -> IntArray:
     """Order of costs, shape (n,): ties by score, higher first, then as supplied.
 
     Costs that differ by rounding only, beyond the twelfth decimal, tie. Infinite costs
@@ -75,6 +94,7 @@ def stable_order(cost: FloatArray, scores: FloatArray | None = None) -> IntArray
     key = np.round(cost, 12)
     if scores is None:
         return np.argsort(key, kind="stable")
-    worst_first = np.where(np.isnan(scores), -np.inf, scores)
+    given = np.asarray(scores, float)
+    worst_first = np.where(np.isnan(given), -np.inf, given)
     second = np.where(np.isfinite(cost), -worst_first, 0.0)
     return np.lexsort((second, key))

@@ -7,15 +7,19 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from reachmap._typing import FloatArray, IntArray
+from reachmap.errors import SettingsError
 from reachmap.maps.format.bin import read_bin_map
 from reachmap.maps.records import BinMap, Stamp
 from reachmap.ranking.lookup.costs import (
+    beyond_points,
     blended_terms,
     grasp_costs,
     likeness_terms,
     outside_map,
+    unlike_map,
 )
 from reachmap.ranking.lookup.frames import frames_of
 from reachmap.ranking.lookup.matching import (
@@ -25,9 +29,18 @@ from reachmap.ranking.lookup.matching import (
     match,
     tied,
 )
-from reachmap.ranking.lookup.order import OUTSIDE_MAP, Ranking, stable_order
-from reachmap.ranking.lookup.queries import queries_from_arrays
-from reachmap.ranking.lookup.settings import CostBasis, RankSettings, Roll
+from reachmap.ranking.lookup.order import (
+    INVALID,
+    OUTSIDE_MAP,
+    UNLIKE_MAP,
+    Ranking,
+    stable_order,
+)
+from reachmap.ranking.lookup.queries import (
+    queries_from_arrays,
+    rotations_from_quaternions,
+)
+from reachmap.ranking.lookup.settings import CostBasis, Invalid, RankSettings, Roll
 from reachmap.ranking.lookup.table import GraspTable, table_from_bin_map
 
 
@@ -77,26 +90,32 @@ class Ranker:
 
     def rank(
         self,
-        points: FloatArray,
-        directions: FloatArray | None = None,
-        rotations: FloatArray | None = None,
+        points: ArrayLike,
+        directions: ArrayLike | None = None,
+        rotations: ArrayLike | None = None,
         *,
+        quaternions_wxyz: ArrayLike | None = None,
+        quaternions_xyzw: ArrayLike | None = None,
         weights: Sequence[float] = (1.0, 1.0, 1.0),
         likeness: float = 0.0,
         neighbours: int = 1,
         roll: Roll = "as-given",
-        scores: FloatArray | None = None,
+        max_angle_deg: float | None = None,
+        invalid: Invalid = "mark",
+        scores: ArrayLike | None = None,
     ) -> Ranking:
         """Rank grasps given in robot_base.
 
         Parameters
         ----------
-        points : array, shape (n, 3)
-            Grasp points [m].
-        directions : array, shape (n, 3), optional
+        points : array_like, shape (n, 3)
+            Grasp points [m]; one grasp may be flat, and there may be none.
+        directions : array_like, shape (n, 3), optional
             Approach directions into the object; their length does not matter.
-        rotations : array, shape (n, 3, 3), optional
+        rotations : array_like, shape (n, 3, 3), optional
             TCP orientations. A row of NaN has none; its direction counts then.
+        quaternions_wxyz, quaternions_xyzw : array_like, shape (n, 4), optional
+            TCP orientations as quaternions, instead of ``rotations``.
         weights : sequence of 3 float
             α, β, δ of path length, planning time and execution time.
         likeness : float
@@ -105,17 +124,37 @@ class Ranker:
             Test points whose costs are blended.
         roll : {"as-given", "free", "fixed"}
             Whether the roll about the approach counts; see :class:`RankSettings`.
-        scores : array, shape (n,), optional
+        max_angle_deg : float, optional
+            Largest φ2 of a grasp that the map speaks about; see :class:`RankSettings`.
+        invalid : {"mark", "raise"}
+            Whether rows that are no grasps get the status ``INVALID``, or an error.
+        scores : array_like, shape (n,), optional
             Break ties of J, higher first; the supplied order breaks what remains.
 
         Raises
         ------
         SettingsError
-            Arrays that do not fit together or are not finite; weights out of range.
+            Arrays that do not fit together; weights out of range; with
+            ``invalid="raise"`` also the rows that are no grasps.
         """
-        settings = RankSettings.of(weights, likeness, neighbours, roll)
+        settings = RankSettings(
+            weights=tuple(weights),  # type: ignore[arg-type]
+            likeness=likeness,
+            neighbours=neighbours,
+            roll=roll,
+            max_angle_deg=max_angle_deg,
+            invalid=invalid,
+        )
+        turned = rotations_from_quaternions(quaternions_wxyz, quaternions_xyzw)
+        if turned is not None and rotations is not None:
+            raise SettingsError("give rotations or quaternions, not both")
         queries = queries_from_arrays(
-            self.table, points, directions, rotations, roll=settings.roll
+            self.table,
+            points,
+            directions,
+            rotations if turned is None else turned,
+            roll=settings.roll,
+            invalid=settings.invalid,
         )
         return self.rank_queries(queries, settings, scores)
 
@@ -123,27 +162,34 @@ class Ranker:
         self,
         queries: Queries,
         settings: RankSettings,
-        scores: FloatArray | None = None,
+        scores: ArrayLike | None = None,
     ) -> Ranking:
         """Rank grasps that are checked already."""
         table = self.table
         table_cost = grasp_costs(table, settings.weights)
         matches = match(queries, table, self._tree, table_cost)
         outside = outside_map(queries.points, matches.point, table)
+        unlike = unlike_map(matches, queries.free, table, settings.max_angle_deg)
         terms = self._terms(queries, matches, table_cost, settings)
-        cost = np.where(outside, np.inf, terms.sum(axis=1))
+        matched = queries.valid & ~outside & ~unlike
+        cost = np.where(matched, terms.sum(axis=1), np.inf)
         cost[np.isnan(cost)] = np.inf
         reachable = np.isfinite(cost)
         status = table.status[matches.point, matches.orientation]
+        status = np.where(unlike, np.uint8(UNLIKE_MAP), status)
+        status = np.where(outside, np.uint8(OUTSIDE_MAP), status)
+        status = np.where(queries.valid, status, np.uint8(INVALID))
+        valid = queries.valid
         return Ranking(
             order=stable_order(cost, scores),
             cost=cost,
             terms=np.where(reachable[:, None], terms, np.nan),
-            status=np.where(outside, np.uint8(OUTSIDE_MAP), status),
-            test_grasp=_unravelled(matches, table),
-            distance=matches.distance,
-            angle=matches.angle,
+            status=status,
+            test_grasp=np.where(valid[:, None], _unravelled(matches, table), -1),
+            distance=np.where(valid, matches.distance, np.nan),
+            angle=np.where(valid, matches.angle, np.nan),
             roll_free=queries.free.copy(),
+            extrapolated=valid & ~outside & beyond_points(queries.points, table),
             orientation_wxyz=table.quaternions[matches.point, matches.orientation]
             + 0.0,
         )

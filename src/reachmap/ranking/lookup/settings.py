@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final, Literal, TypeAlias
 
@@ -15,6 +14,11 @@ PlanningTime: TypeAlias = Literal["checks", "measured"]
 PLANNING_TIMES: Final[tuple[PlanningTime, ...]] = ("checks", "measured")
 # Of 0.9, 0.95, 0.99 and 1, chosen on simulated heaps: docs/reference/conventions.md.
 QUANTILE: Final = 0.95
+Invalid: TypeAlias = Literal["mark", "raise"]
+INVALIDS: Final[tuple[Invalid, ...]] = ("mark", "raise")
+# A grasp is like a test grasp up to half a step in each of three rotations, 0.9 steps
+# in all; a step and a half allows for families with uneven steps.
+ALIKE_STEPS: Final = 1.5
 Roll: TypeAlias = Literal["as-given", "free", "fixed"]
 ROLLS: Final[tuple[Roll, ...]] = ("as-given", "free", "fixed")
 MAX_WEIGHT: Final = 1e6
@@ -67,12 +71,19 @@ class RankSettings:
     roll : {"as-given", "free", "fixed"}
         Whether the roll about the approach counts. As given: it does for grasps
         with a full orientation and not for those with a direction.
+    max_angle_deg : float or None
+        Largest φ2 at which a grasp counts as like its test grasp; beyond, the map
+        says nothing about it. None: 1.5 times the spacing of the map's orientations.
+    invalid : {"mark", "raise"}
+        What becomes of rows that are not finite, have no direction or no rotation.
     """
 
     weights: tuple[float, float, float] = (1.0, 1.0, 1.0)
     likeness: float = 0.0
     neighbours: int = 1
     roll: Roll = "as-given"
+    max_angle_deg: float | None = None
+    invalid: Invalid = "mark"
 
     def __post_init__(self) -> None:
         if len(self.weights) != 3:
@@ -86,23 +97,16 @@ class RankSettings:
             )
         if self.roll not in ROLLS:
             problems.append(f"roll must be one of {', '.join(ROLLS)} ({self.roll!r})")
+        if self.invalid not in INVALIDS:
+            problems.append(f"invalid must be mark or raise (got {self.invalid!r})")
+        limit = self.max_angle_deg
+        if limit is not None and not 0 < limit <= 180:
+            problems.append(f"max_angle_deg must be above 0, to 180 (got {limit:g})")
         if not any(self.weights) and not self.likeness:
             problems.append("one weight at least must be above 0")
         mistakes = [problem for problem in problems if problem]
         if mistakes:
             raise SettingsError(mistakes)
-
-    @classmethod
-    def of(
-        cls, weights: Sequence[float], likeness: float, neighbours: int, roll: Roll
-    ) -> RankSettings:
-        """Make settings of loose values."""
-        return cls(
-            weights=tuple(weights),  # type: ignore[arg-type]
-            likeness=likeness,
-            neighbours=neighbours,
-            roll=roll,
-        )
 
 
 def _weight_problem(name: str, value: float) -> str:

@@ -1,0 +1,96 @@
+"""Questions that a list raises of which the map knows next to nothing.
+
+A list in other units, with normals for approach directions or in another frame looks
+well-formed, and every row of it is wrong. Where most of a list is unlike the map, the
+usual mistakes are undone one by one; one that would make it alike is asked about.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from reachmap.ranking.lists.arrays import GraspList
+from reachmap.ranking.lookup.order import UNMATCHED, Ranking
+
+MANY: Final = 0.3
+"""Share of unmatched grasps from which a list is looked at more closely."""
+RESOLVED: Final = 0.7
+"""Share of those that a mistake, undone, must bring back to be asked about."""
+
+
+MILLIMETRES_FROM_M: Final = 5.0
+METRES_BELOW_M: Final = 2e-3
+
+
+def matched_count(ranking: Ranking) -> int:
+    """Grasps that the map speaks about."""
+    return int((~np.isin(ranking.status, [*UNMATCHED])).sum())
+
+
+def list_doubts(
+    grasps: GraspList, ranking: Ranking, rank: Callable[[GraspList], Ranking]
+) -> tuple[str, ...]:
+    """Ask about the mistake that explains why a list does not fit the map.
+
+    Parameters
+    ----------
+    grasps : GraspList
+    ranking : Ranking
+        Of the list as it is.
+    rank : callable
+        Ranks a list with the same settings.
+
+    Returns
+    -------
+    tuple of str
+        Sentences, none for a list that fits.
+    """
+    total, matched = len(grasps), matched_count(ranking)
+    missing = total - matched
+    if not total or missing < MANY * total:
+        return ()
+    what = f"{missing} of {total} grasps are nowhere near what the map knows"
+    for question, other in _usual_mistakes(grasps):
+        better = matched_count(rank(other))
+        if better - matched >= RESOLVED * missing:
+            return (f"{what}; {question} ({better} would be)",)
+    return (f"{what}; are the frame ({grasps.frame}) and the map right?",)
+
+
+def _usual_mistakes(grasps: GraspList) -> Iterator[tuple[str, GraspList]]:
+    """Questions, each with the list as it would be without the mistake."""
+    normals = "are these outward normals? then direction_convention: outward_normal"
+    millimetres = 'are these millimetres? then units: {"length": "mm"}'
+    metres = "are these metres, not millimetres?"
+    both = "are these outward normals in millimetres? then state units and convention"
+    yield normals, _turned(grasps)
+    # Any list shrunk to a thousandth falls onto the origin: only what is as far out as
+    # millimetres would be is asked about.
+    far_m = float(np.median(np.linalg.norm(grasps.points, axis=1)))
+    if far_m > MILLIMETRES_FROM_M:
+        yield millimetres, _scaled(grasps, 1e-3)
+        yield both, _scaled(_turned(grasps), 1e-3)
+    if far_m < METRES_BELOW_M:
+        yield metres, _scaled(grasps, 1e3)
+
+
+def _turned(grasps: GraspList) -> GraspList:
+    """The list with every approach the other way round."""
+    about_x = np.diag([1.0, -1.0, -1.0])
+    about_y = np.diag([-1.0, 1.0, -1.0])
+    turn = about_y if grasps.approach_axis.endswith("x") else about_x
+    return replace(
+        grasps, directions=-grasps.directions, rotations=grasps.rotations @ turn
+    )
+
+
+def _scaled(grasps: GraspList, factor: float) -> GraspList:
+    T = grasps.T_frame_bin
+    if T is not None:
+        T = T.copy()
+        T[:3, 3] *= factor
+    return replace(grasps, points=grasps.points * factor, T_frame_bin=T)
