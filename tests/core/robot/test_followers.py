@@ -196,3 +196,11 @@ def test_coupled_joints_of_the_chain_are_refused_in_a_sentence(tmp_path: Path) -
     locked = ("robot.locked_joints_deg={j2: 30}", "scan_configuration.q_deg={j1: 0}")
     arm = Scene.build(load(tmp_path, urdf, "l3", ("j1",), locked)).robot
     assert arm.joint_names == ("j1",)
+
+
+def test_a_joint_that_mimics_nothing_is_one_of_its_own(tmp_path: Path) -> None:
+    """As MoveIt has it, and said in a warning."""
+    stray = ARM[6].replace(LIMIT, LIMIT + '<mimic joint="gone"/>')
+    loaded = load(tmp_path, robot(*ARM[:6], stray), "l3", JOINTS)
+    assert "joint 'j3' mimics 'gone', which is no moving joint" in loaded.warnings[0]
+    assert Scene.build(loaded).robot.joint_names == JOINTS

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from xml.etree import ElementTree
 
 import numpy as np
@@ -161,6 +161,7 @@ def parse_urdf(text: str, label: str) -> UrdfDescription:
     if faults:  # joints and collision elements need numbers
         raise CellError([f"{label}: {fault}" for fault in faults[:50]])
     joints = [_joint(element, faults, notes) for element in root.findall("joint")]
+    joints = _with_leaders(joints, notes)
     faults += _repeated("link", links) + _repeated("joint", [j.name for j in joints])
     if max(len(links), len(joints)) > MAX_LINKS:
         raise CellError(f"{label}: more than {MAX_LINKS:,} links or joints")
@@ -218,6 +219,19 @@ def _joint(
         offset=factors[1],
         origin=Origin.of(element),
     )
+
+
+def _with_leaders(joints: list[UrdfJoint], notes: list[str]) -> list[UrdfJoint]:
+    """Let joints that mimic what does not move go their own way, as MoveIt does."""
+    leaders = {joint.name for joint in joints if joint.type in MOVING}
+    stray = {j.name for j in joints if j.mimics is not None and j.mimics not in leaders}
+    notes += [
+        f"joint {joint.name!r} mimics {joint.mimics!r}, which is no moving joint; "
+        "it is taken for a joint of its own"
+        for joint in joints
+        if joint.name in stray
+    ]
+    return [replace(j, mimics=None) if j.name in stray else j for j in joints]
 
 
 def _bounds(

@@ -99,8 +99,6 @@ def _follower(name: str, joints: Mapping[str, UrdfJoint]) -> Follower:
     """Follow a chain of mimicking joints to the one that leads."""
     multiplier, offset, seen = 1.0, 0.0, [name]
     while (joint := joints[seen[-1]]).mimics is not None:
-        if joint.mimics not in joints:
-            raise ValueError(f"mimics {joint.mimics!r}, which is no moving joint")
         if joint.mimics in seen:
             raise ValueError(f"mimics in a circle ({' → '.join(seen)} → …)")
         offset += multiplier * joint.offset
