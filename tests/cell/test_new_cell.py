@@ -271,6 +271,11 @@ MESSAGE = """world:
       pose: {position: {x: -1.0, y: 0.0, z: 0.0}, orientation: {w: 1.0}}
       primitives: [{type: 3, dimensions: [0.4, 0.1]}]
       primitive_poses: [{position: {x: 0.0, y: 1.0, z: 0.2}}]
+    - id: bar
+      primitives: [{type: box, dimensions: [0.4, 0.1, 0.1]}]
+      primitive_poses: [{position: [0, 1.5, 0], orientation: [0, 0, 1, 0]}]
+    - id: table
+      primitives: [{type: sphere, dimensions: [0.4]}]
 """
 
 
@@ -310,9 +315,11 @@ def test_a_moveit_configuration_is_taken_over(tmp_path: Path) -> None:
     rows = {row.name: row.velocity for row in check(str(output)).joints}
     assert rows["j1"] == pytest.approx(np.degrees(0.5))
     bodies = {body.name: body for body in loaded.cell.bodies}
-    assert sorted(bodies) == ["old_post_1", "shelf", "table"]
+    assert sorted(bodies) == ["bar", "old_post_1", "shelf", "table"]
+    assert "scene.yaml: 'table' is in another scene, too" in made.stderr
     assert bodies["table"].shape.box == (1, 2, 0.1)
     assert bodies["table"].pose.xyz == (0.5, 0, -0.55)
+    assert bodies["bar"].pose.matrix()[:3, 0] == pytest.approx([-1, 0, 0])
     assert bodies["old_post_1"].pose.xyz == (-0.6, 0.6, 0.2)
     shelf = bodies["shelf"].shape.cylinder
     assert shelf is not None

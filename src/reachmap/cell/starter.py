@@ -11,6 +11,8 @@ from dataclasses import dataclass, field
 from reachmap.cell.files.urdf import UrdfJoint
 from reachmap.cell.text.yaml_writer import WIDTH, scalar
 
+SIX_AXES = 6
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StarterChoices:
@@ -249,6 +251,11 @@ def _scans(c: StarterChoices) -> str:
     reach = max(0.05, math.ceil(c.reach_m * 20) / 20)
     layer = scalar(round(_bin_inner(c)[2] / 3, 3))
     cone = "{family: cone, tilts_deg: [0, 30], azimuths: [1, 8], rolls: 3}"
+    if len(c.joints) < SIX_AXES:
+        cone = (
+            "{family: cone, tilts_deg: [0], azimuths: [1], rolls: 12}\n"
+            "  # Few axes reach few orientations: straight down in twelve rolls"
+        )
     low, high = round(-0.4 * reach, 3), round(0.6 * reach, 3)
     side = round(0.85 * reach, 3)
     left = round(-0.1 * reach, 3)

@@ -142,8 +142,14 @@ def _with_moveit(
     notes = [*found.notes]
     for path in config.scenes:
         some, left_out = read_scene(path)
-        bodies += some
+        taken = {body.name for body in bodies}
+        bodies += [body for body in some if body.name not in taken]
         notes += left_out
+        notes += [
+            f"{path.name}: {body.name!r} is in another scene, too, and left out here"
+            for body in some
+            if body.name in taken
+        ]
     return replace(found, bodies=tuple(bodies), notes=tuple(notes))
 
 

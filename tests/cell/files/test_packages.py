@@ -120,3 +120,20 @@ def test_a_file_in_a_neighbouring_package_may_be_absolute(tmp_path: Path) -> Non
     assert resolver.resolve_from_urdf(f"file:///{finger}", urdf.parent, root) == finger
     with pytest.raises(NotFoundError, match="leads out of"):
         resolver.resolve_from_urdf(str(stranger), urdf.parent, root)
+
+
+def test_a_path_of_another_machine_leads_into_the_package(tmp_path: Path) -> None:
+    """A URDF that was expanded where its package was installed works as it is."""
+    own = package(tmp_path / "arm-main", "arm")
+    urdf, mesh = make(own, "urdf/arm.urdf"), make(own, "meshes/a.stl")
+    resolver = Resolver(directory=tmp_path / "cells").around(str(urdf))
+
+    def find(reference: str) -> Path:
+        return resolver.resolve_from_urdf(reference, urdf.parent, own)
+
+    assert find("file:///root/ws/install/arm/share/arm/meshes/a.stl") == mesh
+    assert find("/home/me/ws/src/arm/meshes/a.stl") == mesh
+    with pytest.raises(NotFoundError):
+        find("file:///root/ws/install/leg/share/leg/meshes/a.stl")
+    with pytest.raises(NotFoundError):
+        find("file:///root/ws/share/arm/../../../../secret.stl")

@@ -128,3 +128,13 @@ def test_packages_that_find_found_are_told(tmp_path: Path) -> None:
     resolver = Resolver(directory=tmp_path, packages={"gripper": "tools"})
     found = expand_xacro(path, {}, resolver)
     assert found.packages == {"gripper": str(tmp_path / "tools")}
+
+
+def test_of_the_warnings_those_are_told_that_matter(tmp_path: Path) -> None:
+    """An include that matches nothing, once; redefined names are a matter of style."""
+    inner = '<xacro:include filename="parts/*.xacro"/>' * 2
+    inner += '<xacro:property name="pi" value="3"/>'
+    path = write(tmp_path / "arm.xacro", inner)
+    found = expand_xacro(path, {}, Resolver(directory=tmp_path))
+    assert len(found.warnings) == 1
+    assert "matched no files" in found.warnings[0]

@@ -52,7 +52,7 @@ def find_moveit_config(folder: Path, robot: str) -> MoveItConfig:
     found = next((path for path in limits if is_file(path)), None)
     scenes = tuple(
         path
-        for path in sorted(folder.rglob("*"))
+        for path in sorted(folder.rglob("*"), key=lambda p: (p.suffix != ".scene", p))
         if path.suffix in SCENE_SUFFIXES and is_file(path)
     )
     if srdf is None and found is None:

@@ -141,8 +141,7 @@ def _of_message(data: Any, label: str) -> tuple[list[SceneBody], list[str]]:
         poses = list(entries(item, "primitive_poses"))
         for k, shape in enumerate(shapes):
             whole = name if len(shapes) == 1 else f"{name}_{k + 1}"
-            number = at(shape, "type")
-            kind = PRIMITIVES.get(number, "cone") if isinstance(number, int) else "cone"
+            kind = _kind(at(shape, "type"))
             try:
                 sizes = [float(value) for value in entries(shape, "dimensions")]
                 if kind == "cylinder":  # the message has the height first
@@ -159,6 +158,13 @@ def _of_message(data: Any, label: str) -> tuple[list[SceneBody], list[str]]:
             )
         notes += [_left_out(label, name, "mesh") for _ in entries(item, "meshes")]
     return bodies, notes
+
+
+def _kind(given: Any) -> str:
+    """Name of a primitive that is given by its number or its name."""
+    if isinstance(given, int):
+        return PRIMITIVES.get(given, "cone")
+    return given.lower() if isinstance(given, str) else "shape without a type"
 
 
 def _message_pose(pose: Any) -> FloatArray:

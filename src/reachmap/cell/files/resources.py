@@ -37,6 +37,8 @@ from reachmap.disk import is_file, is_folder
 
 SCHEME = "package://"
 SHIPPED = "reachmap-cells"
+# Folders that hold packages in a ROS installation or workspace.
+INSTALLED = ("share", "src", "install")
 
 
 class NotFoundError(LookupError):
@@ -169,6 +171,7 @@ class Resolver:
                 f"{reference!r}: unknown scheme {scheme[:20]!r} (package:// or file://)"
             )
         paths = [_normal(folder / text) for text in _spellings(reference)]
+        paths += [moved for path in paths for moved in self._of_other_machine(path)]
         allowed = [root, self.directory, *search_folders()]
         allowed += [self.directory / folder for folder in self.packages.values()]
         within = [
@@ -177,12 +180,33 @@ class Resolver:
             if any(path.is_relative_to(_normal(place)) for place in allowed)
             or self._in_known_package(path)
         ]
+        if not within and not any(is_file(path) for path in paths):
+            raise NotFoundError(
+                f"file {reference!r} not found; if it names the folder of a package on "
+                "another machine, say where the package is here: new-cell "
+                "--package NAME=FOLDER, or resources.packages of the cell"
+            )
         if not within:
             raise NotFoundError(
                 f"{reference!r}: leads out of {root}; "
                 "add its folder to resources.packages"
             )
         return _existing(reference, within)
+
+    def _of_other_machine(self, path: Path) -> list[Path]:
+        """Places of a file named by where its package was installed elsewhere.
+
+        URDFs that were expanded from xacro have such names: ``…/share/NAME/meshes/…``.
+        """
+        if is_file(path) or not path.is_absolute():
+            return []
+        parts = path.parts
+        return [
+            _normal(folder.joinpath(*parts[k + 1 :]))
+            for k in range(1, len(parts) - 1)
+            if parts[k - 1] in INSTALLED
+            for folder in self.package_folders(parts[k])[0]
+        ]
 
     def _in_known_package(self, path: Path) -> bool:
         """Whether a path lies in a package that its name leads to, too."""
@@ -194,7 +218,8 @@ class Resolver:
 
     def _in_package(self, reference: str) -> tuple[Path, Path]:
         """File and package folder of a ``package://`` reference."""
-        name, _, rest = reference.removeprefix(SCHEME).partition("/")
+        # Some write three slashes.
+        name, _, rest = reference.removeprefix(SCHEME).lstrip("/").partition("/")
         if not name or not rest:
             raise NotFoundError(f"{reference!r}: expected package://NAME/PATH")
         folders, _ = self.package_folders(name)

@@ -8,9 +8,10 @@ from pathlib import Path
 from reachmap.cell.files.resources import Resolver
 from reachmap.cell.files.urdf import MAX_URDF_BYTES
 from reachmap.cell.files.xacro import Expansion, expand_xacro
-from reachmap.cell.files.xml_text import read_xml
+from reachmap.cell.files.xml_text import parse_xml, read_xml
 from reachmap.errors import CellError
 
+DEFINITIONS = ("xacro:arg", "xacro:property", "xacro:macro")
 # Suffixes of files that people take for robot descriptions, and what they are.
 OTHER_FILES = {
     ".usd": "USD",
@@ -54,8 +55,15 @@ def robot_text(
         return expand_xacro(path, arguments, resolver)
     text = read_xml(path, limit=MAX_URDF_BYTES)
     if "<xacro:" in text:
-        raise CellError(
-            f"{path}: has <xacro:…> elements, which a URDF cannot; name it "
-            f"{path.name}.xacro to have it expanded"
-        )
+        _refuse_xacro(text, path)
     return Expansion(text=text, arguments=(), packages={}, warnings=())
+
+
+def _refuse_xacro(text: str, path: Path) -> None:
+    """Refuse elements that would have to be expanded; definitions alone do no harm."""
+    for element in parse_xml(text, path.name).iter():
+        if element.tag.startswith("xacro:") and element.tag not in DEFINITIONS:
+            raise CellError(
+                f"{path}: has <{element.tag}>, which is to be expanded; name the file "
+                f"{path.name}.xacro"
+            )

@@ -22,6 +22,14 @@ from reachmap.errors import CellError, MissingExtraError
 LIMIT_CPU_S = 20
 LIMIT_WALL_S = 300.0
 LIMIT_BYTES = 4_000_000_000
+PLACES = (
+    "when instantiating",
+    "instantiated from",
+    "in file",
+    "included from",
+    "when processing",
+)
+HARMLESS = re.compile(r"redefining (global symbol|macro)|deprecated")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -93,7 +101,7 @@ def expand_xacro(
         text=answer["text"],
         arguments=tuple(answer["arguments"]),
         packages=answer["packages"],
-        warnings=tuple(f"{path.name}: {line}" for line in _lines(done.stderr)),
+        warnings=tuple(f"{path.name}: {line}" for line in _warnings(done.stderr)),
     )
 
 
@@ -111,6 +119,12 @@ def _reason(answer: Mapping[str, str]) -> str:
     )
 
 
-def _lines(stderr: str) -> list[str]:
+def _warnings(stderr: str) -> list[str]:
+    """What xacro ignored or could not find; not where, and nothing about style."""
     plain = re.sub(r"\x1b\[[0-9;]*m", "", stderr)
-    return [line.strip() for line in plain.splitlines() if line.strip()][:20]
+    lines = dict.fromkeys(line.strip() for line in plain.splitlines())
+    return [
+        line
+        for line in lines
+        if line and not line.startswith(PLACES) and not HARMLESS.search(line)
+    ][:20]

@@ -85,6 +85,7 @@ def _expanded(request: dict[str, Any]) -> dict[str, Any]:
     xacro.parse = read
     substitution_args._eval_find = find
     substitution_args._eval_dict["find"] = find
+    _declared.append(arguments)
     context = xacro.substitution_args_context
     evaluate = xacro.eval_extension
 
@@ -105,6 +106,15 @@ def _expanded(request: dict[str, Any]) -> dict[str, Any]:
     return {"text": text, "arguments": list(arguments.names), "packages": found}
 
 
+_declared: list[_Arguments] = []
+
+
+def _takes() -> str:
+    """Say which arguments there are: a file name made from one may be wrong."""
+    names = ", ".join(_declared[0].names) if _declared else ""
+    return f" (arguments of the file: {names})" if names else ""
+
+
 def _explained(error: Exception) -> dict[str, str]:
     """Answer for a failure, by what lies at its bottom."""
     causes = [error]
@@ -117,6 +127,8 @@ def _explained(error: Exception) -> dict[str, str]:
             return {"error": str(cause)}
     if isinstance(causes[-1], MemoryError):
         return {}
+    if isinstance(causes[-1], OSError) and causes[-1].filename is not None:
+        return {"error": f"{causes[-1].strerror}: {causes[-1].filename}{_takes()}"}
     lines = [line.strip() for line in str(error).splitlines() if line.strip()]
     reason = lines[0] if lines else type(causes[-1]).__name__
     stack = [name for name in xacro.filestack or [] if name]
