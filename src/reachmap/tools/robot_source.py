@@ -101,7 +101,6 @@ def read_source(
         robot=robot,
         packages={},
         xacro_args=dict(xacro_args),
-        notes=expansion.warnings,
     )
     expansions = [expansion]
     if moveit_config is not None:
