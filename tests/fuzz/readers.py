@@ -90,10 +90,12 @@ def srdf(data: bytes, folder: Path) -> None:
 
 
 def limits(data: bytes, folder: Path) -> None:
-    """Text of MoveIt's joint limits."""
+    """Text of MoveIt's joint limits, for the toy arm."""
     from reachmap.cell.files.joint_limits import parse_joint_limits
+    from reachmap.cell.files.urdf import parse_urdf
 
-    parse_joint_limits(data.decode("utf-8", "replace"), "joint_limits.yaml")
+    text, robot = data.decode("utf-8", "replace"), parse_urdf(URDF, "arm.urdf")
+    parse_joint_limits(text, "joint_limits.yaml", robot)
 
 
 def grasps(data: bytes, folder: Path) -> None:

@@ -1,10 +1,13 @@
 """Files appear whole or not at all, and nothing that stood there is harmed."""
 
+import contextlib
 import errno
 import os
+import random
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -200,4 +203,28 @@ def test_two_writers_of_one_file_are_kept_apart(tmp_path: Path) -> None:
 
     publish(path, chunks())
     assert path.read_bytes() == b"first"
+    assert names(tmp_path) == ["o.h5"]
+
+
+def test_kills_at_any_moment_leave_the_old_file_or_the_new(tmp_path: Path) -> None:
+    """Whole either way, and beside it one temporary file at most."""
+    path = tmp_path / "o.h5"
+    contents = [bytes([letter]) * 300_000 for letter in b"ab"]
+    publish(path, contents[:1])
+    rng = random.Random(1)
+    for _ in range(60):
+        child = os.fork()
+        if child == 0:
+            with contextlib.suppress(BaseException):
+                while True:
+                    for content in contents:
+                        publish(path, [content], overwrite=True)
+            os._exit(1)
+        time.sleep(rng.uniform(0.0, 0.03))
+        os.kill(child, signal.SIGKILL)
+        _, status = os.waitpid(child, 0)
+        assert os.WTERMSIG(status) == signal.SIGKILL
+        assert path.read_bytes() in contents
+        assert set(names(tmp_path)) <= {"o.h5", "o.h5.tmp"}
+    publish(path, [b"end"], overwrite=True)
     assert names(tmp_path) == ["o.h5"]
