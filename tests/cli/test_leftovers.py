@@ -25,6 +25,7 @@ RUNS = [
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(1200)
 def test_20_runs_leave_nothing_in_the_temporary_folder(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
