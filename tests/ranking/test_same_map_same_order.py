@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from scipy.spatial.transform import Rotation
 
 from reachmap.cli import group
 from reachmap.maps import read_bin_map, write_bin_map
@@ -117,6 +118,20 @@ def test_the_roadmap_s_own_path_has_a_cost():
     np.testing.assert_array_equal(means[..., 2], best.execution_time[0, 1])
     old = Ranker(dataclasses.replace(record, best=None)).table
     assert not old.reachable.reshape(1, 2, 3, 4)[0, 1].any()
+
+
+def test_the_recommended_orientation_is_the_roll_that_won():
+    """R_test times a rotation about the approach axis, by SciPy's rotations."""
+    record = bin_with_parts(synthetic_bin_map(1.0, shape=(1, 2, 2, 3, 1)))
+    ranker = Ranker(record)
+    points = np.repeat(record.position.reshape(-1, 3), 3, axis=0)
+    R_test = Rotation.from_quat(
+        np.roll(record.quaternion_wxyz.reshape(-1, 4), -1, axis=1)
+    )
+    ranking = ranker.rank(points, rotations=R_test.as_matrix())
+    turn = Rotation.from_rotvec(record.winning_roll.reshape(-1, 1) * [0.0, 0.0, 1.0])
+    got = Rotation.from_quat(np.roll(ranking.orientation_wxyz, -1, axis=1))
+    assert (got.inv() * (R_test * turn)).magnitude().max() < 1e-7
 
 
 @pytest.mark.slow

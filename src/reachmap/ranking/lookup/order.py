@@ -49,7 +49,8 @@ class Ranking:
     extrapolated : bool array, shape (n,)
         Beyond the outermost test points, where the map continues what it knows.
     orientation_wxyz : array, shape (n, 4)
-        R_test of the test grasp in robot_base: the tool orientation to use.
+        The tool orientation to use, in robot_base: R_test of the test grasp, turned
+        about the approach by the roll that its best path takes, where roll is free.
     """
 
     order: IntArray

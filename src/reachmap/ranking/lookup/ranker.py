@@ -190,7 +190,7 @@ class Ranker:
             angle=np.where(valid, matches.angle, np.nan),
             roll_free=queries.free.copy(),
             extrapolated=valid & ~outside & beyond_points(queries.points, table),
-            orientation_wxyz=table.quaternions[matches.point, matches.orientation]
+            orientation_wxyz=table.recommended[matches.point, matches.orientation]
             + 0.0,
         )
 

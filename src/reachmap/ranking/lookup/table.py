@@ -38,6 +38,9 @@ class GraspTable:
         d_test in robot_base [m].
     quaternions : array, shape (n, m, 4)
         R_test in robot_base, wxyz.
+    recommended : array, shape (n, m, 4)
+        The tool orientation of the best path: R_test, turned by the roll that won
+        where the roll is free.
     axes : array, shape (n, m, 3)
         Approach directions in robot_base.
     status : uint8 array, shape (n, m)
@@ -74,6 +77,7 @@ class GraspTable:
     shape: tuple[int, int, int, int]
     points: FloatArray
     quaternions: FloatArray
+    recommended: FloatArray
     axes: FloatArray
     status: CodeArray
     blocking_pair: IntArray
@@ -142,6 +146,7 @@ def table_from_bin_map(bin_map: BinMap, basis: CostBasis | None = None) -> Grasp
         shape=(nl, ny, nx, no),
         points=points.copy(),
         quaternions=quaternions,
+        recommended=_recommended(bin_map, quaternions),
         axes=axes,
         status=_status(bin_map.status.reshape(n, no), reachable),
         blocking_pair=bin_map.blocking_pair.reshape(n, no).copy(),
@@ -169,6 +174,24 @@ def _unit_quaternions(quaternions: FloatArray) -> FloatArray:
     if not (np.abs(norm - 1.0) < 1e-6).all():
         raise MapFileError("the bin map has quaternions that are not of unit length")
     return np.asarray(quaternions / norm)
+
+
+def _recommended(bin_map: BinMap, quaternions: FloatArray) -> FloatArray:
+    """R_test rolled about the approach axis by what the best path takes."""
+    if bin_map.winning_roll is None:
+        return quaternions
+    half = 0.5 * np.nan_to_num(bin_map.winning_roll).reshape(quaternions.shape[:-1])
+    axis = axis_vector(bin_map.approach_axis)
+    w, v = quaternions[..., :1], quaternions[..., 1:]
+    c, s = np.cos(half)[..., None], np.sin(half)[..., None] * axis
+    turned = np.concatenate(
+        [
+            w * c - (v * s).sum(axis=-1, keepdims=True),
+            w * s + c * v + np.cross(v, s),
+        ],
+        axis=-1,
+    )
+    return turned * np.where(turned[..., :1] < 0, -1.0, 1.0)
 
 
 def _possible(basis: CostBasis, bin_map: BinMap) -> CostBasis:
