@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from itertools import islice
+
+import coal
 import numpy as np
 import pytest
 from hypothesis import given
@@ -9,9 +12,19 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from reachmap.cell.loading import read_cell
+from reachmap.core.collision.bodies import build_geometry
+from reachmap.core.collision.camera import Camera
+from reachmap.core.collision.static_bodies import PlacedBodies, bodies_at
 from reachmap.core.scene import Scene
+from reachmap.errors import CellError
+from reachmap.geometry import yaw_transform
 from reachmap.placement.mapped.exact import PlacedScene
-from reachmap.placement.mapped.imaging import can_choose, imaging_configurations
+from reachmap.placement.mapped.imaging import (
+    can_choose,
+    imaging_configurations,
+    is_in_picture,
+    picture_of,
+)
 from reachmap.placement.mapped.sample import THIN, open_frames, sample_of
 from reachmap.placement.mapped.viewpoints import (
     NOT_SEEN,
@@ -143,9 +156,79 @@ def test_something_in_the_line_of_sight_leaves_no_configuration():
     )
 
 
-def test_a_cell_without_a_camera_on_its_tool_keeps_its_configuration():
-    """Only a camera that moves with the tool gives a choice."""
+STANDING = (
+    "camera.parent=world",
+    "camera.xyz=[0.5,0,1.0]",
+    "camera.rpy_deg=[180,0,90]",
+    "camera.range_m=[0.6,1.4]",
+)
+
+
+def test_a_standing_camera_sees_what_a_pinhole_sees():
+    """The bin is in the picture where all corners of its pick volume are."""
+    cell = read_cell(UR5, STANDING).cell
+    T_world_camera = cell.camera.matrix()
+    rng = np.random.default_rng(5)
+    seen = []
+    for x, y, yaw in rng.uniform([0.0, -0.6, 0.0], [1.0, 0.6, np.pi], (200, 3)):
+        T = yaw_transform(x, y, 0.0, yaw)
+        height = min(max(cell.bin_scan.layers), cell.bin.inner[2])
+        corners = corners_of(cell.bin.inner, height) @ T[:3, :3].T + T[:3, 3]
+        wanted = all(
+            sees(cell.camera, T_world_camera, p, in_range="along the axis")
+            for p in corners
+        )
+        assert is_in_picture(cell, T_world_camera, T) == wanted
+        seen.append(wanted)
+    assert 0.05 < np.mean(seen) < 0.8
+
+
+def test_the_arm_waits_where_it_does_not_hide_the_bin():
+    """The cell's own configuration is left for one past which every corner is seen."""
+    placed = placed_ur5((0.5, 0.0, 0.0, 1.57), *STANDING)
+    scene = placed.scene
+    own = scene.scan_configuration
+    assert "hides part of the bin" in picture_of(scene, own)
+    found = list(islice(imaging_configurations(scene, placed.Q, placed.frame), 4))
+    assert len(found) == 4
+    geometry = build_geometry(scene.robot, scene.loaded, with_bin=False)
+    inner = scene.loaded.cell.bin.inner
+    corners = 0.95 * corners_of(inner, 0.05) + [0.0, 0.0, 0.005]
+    corners = corners @ scene.T_base_bin[:3, :3].T + scene.T_base_bin[:3, 3]
+    lens = np.array([0.5, 0.0, 1.0])
+    for q, is_free in [(own, False), *((q, True) for q in found)]:
+        arm = PlacedBodies(bodies_at(scene.robot, geometry, q))
+        ways = [
+            lens + share * (corner - lens)
+            for corner in corners
+            for share in np.linspace(0.02, 0.98, 200)
+        ]
+        hits = [
+            arm.first_touched(coal.Sphere(1e-4), yaw_transform(*point, 0.0)) >= 0
+            for point in ways
+        ]
+        assert (not any(hits)) == is_free
+
+
+def test_a_camera_may_be_fixed_to_a_body():
+    """On a mast it is where it would be in the world; an unknown name is a mistake."""
+    mast = (
+        'bodies.pedestal={"name":"pedestal","shape":{"box":[0.02,0.02,0.02]},'
+        '"pose":{"xyz":[0.4,0.1,1.2]}}'
+    )
+    scene = scene_of(UR5, *STANDING[1:], mast, "camera.parent=pedestal", with_bin=False)
+    T = Camera(scene.robot, scene.loaded).T_base_camera(scene.scan_configuration)
+    T_base_world = scene.loaded.cell.T_base_world()
+    mast_pose = T_base_world @ yaw_transform(0.4, 0.1, 1.2, 0.0)
+    np.testing.assert_allclose(T, mast_pose @ scene.loaded.cell.camera.matrix())
+    with pytest.raises(CellError, match="no frame 'most'"):
+        read_cell(UR5, (*STANDING, "camera.parent=most"))
+
+
+def test_a_cell_without_a_camera_keeps_its_configuration():
+    """A camera on the tool or one that stands gives a choice; on the forearm, none."""
     assert can_choose(scene_of(UR5, with_bin=False))
     assert not can_choose(scene_of("planar-toy", with_bin=False))
     fixed = ("camera.parent=world", "camera.xyz=[0.5,0,1.0]")
-    assert not can_choose(scene_of(UR5, *fixed, with_bin=False))
+    assert can_choose(scene_of(UR5, *fixed, with_bin=False))
+    assert not can_choose(scene_of(UR5, "camera.parent=forearm_link", with_bin=False))

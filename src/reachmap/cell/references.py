@@ -74,7 +74,7 @@ def _check_frames(document: Document, robot: UrdfDescription) -> None:
     places: list[tuple[Location, list[str]]] = [
         (("robot", "tcp", "parent"), frames),
         (("robot", "base_frame"), frames),
-        (("camera", "parent"), frames),
+        (("camera", "parent"), [*WORLD, *frames, *_body_names(document)]),
     ]
     for index in range(len(entries(document.data, "bodies"))):
         places.append((("bodies", index, "attach_to"), [*WORLD, *frames]))
@@ -83,6 +83,11 @@ def _check_frames(document: Document, robot: UrdfDescription) -> None:
         if name is not None and name not in known:
             hint = did_you_mean(name, known)
             document.add(location, f"no frame {name!r} in the URDF; {hint}")
+
+
+def _body_names(document: Document) -> list[str]:
+    names = [text_at(body, "name") for body in entries(document.data, "bodies")]
+    return [name for name in names if name]
 
 
 def _check_body_names(document: Document, robot: UrdfDescription) -> None:

@@ -11,6 +11,8 @@ from reachmap._typing import FloatArray
 from reachmap.core.collision.bin_fit import BinFit
 from reachmap.errors import SceneError
 from reachmap.geometry import inverse_transform
+from reachmap.maps.records import Status
+from reachmap.maps.summary.nothing import likeliest_cause
 from reachmap.placement.mapped.candidates import Candidate, CandidateTable
 from reachmap.placement.mapped.exact import PlacedScene, Pose
 from reachmap.placement.mapped.imaging import UNSEEN
@@ -20,6 +22,7 @@ from reachmap.placement.paper_rule import LatticePoint, choose_by_paper
 from reachmap.placement.predicted.places import apart_m, rank_key
 from reachmap.placement.problem import Question
 from reachmap.placement.scan_choice import FINALISTS, ScanChoice, choose_scan
+from reachmap.scans.ik_survey import survey_frames
 
 NO_ROW = -1
 # Poses to look at, at most, once the pose of the bin is decided.
@@ -146,6 +149,32 @@ def nowhere(question: Question, table: CandidateTable) -> str:
     return f"{question.loaded.source}: the bin can stand nowhere in the region{why}"
 
 
+def refuse_nothing(question: Question, decision: Decision) -> None:
+    """Refuse to choose among poses of which none serves a single test frame.
+
+    Raises
+    ------
+    SceneError
+        With the likeliest cause at the best of them.
+    """
+    best = decision.table.rows[decision.ranked[0]]
+    if best.score is None or best.score.score > 0.0:
+        return
+    sample = sample_of(question.loaded.cell, THIN, question.is_open)
+    placed = PlacedScene(question.moving, best.pose, sample)
+    approach_m = question.loaded.cell.bin_scan.approach_distance_m
+    survey = survey_frames(placed.scene, placed.T, approach_m)
+    status = survey.status.copy()
+    status[status == Status.NOT_ATTEMPTED] = Status.NO_PATH_FOUND
+    pairs = placed.scene.checker.body_pairs
+    why = likeliest_cause(status, survey.blocking_pair, pairs)
+    x, y, z, yaw = best.pose
+    raise SceneError(
+        f"{question.loaded.source}: no place for the bin: even at x={x:.3f} y={y:.3f} "
+        f"z={z:.3f} yaw={np.degrees(yaw):.0f} {why}"
+    )
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Outcome:
     """What becomes the artefact.
@@ -209,6 +238,8 @@ def _scan(question: Question, candidate: Candidate) -> ScanChoice | None:
         sample = sample_of(question.loaded.cell, THIN, question.is_open)
         placed = PlacedScene(question.moving, candidate.pose, sample)
         return choose_scan(placed, question.evaluator)
+    if not question.can_be_imaged(candidate.pose):
+        return None
     assert candidate.score is not None
     q: FloatArray = np.array(question.scene.scan_configuration)
     return ScanChoice(q=q, score=candidate.score, is_new=False)

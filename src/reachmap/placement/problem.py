@@ -15,7 +15,12 @@ from reachmap.maps.records import WorkspaceMap
 from reachmap.placement.mapped.candidates import Candidate
 from reachmap.placement.mapped.evaluator import Evaluator
 from reachmap.placement.mapped.exact import ALWAYS, Pose, bin_at
-from reachmap.placement.mapped.imaging import imaging_configurations
+from reachmap.placement.mapped.imaging import (
+    OUT_OF_SIGHT,
+    imaging_configurations,
+    is_in_picture,
+    picture_of,
+)
 from reachmap.placement.predicted.places import best_at_each_place, pose_grid
 from reachmap.placement.predicted.prediction import field_of, footprint_of, predict
 from reachmap.placement.predicted.region import Region
@@ -40,6 +45,9 @@ class Question:
         Without the bin.
     moving : Scene
         With a bin that can be moved, to look at one pose after the other.
+    still_camera : array, shape (4, 4), or None
+        T_base_camera of a camera that is not on the tool: where the bin must be in its
+        picture.
     keep_scan : bool
         Whether the cell's own scan configuration stays.
     fit : BinFit
@@ -56,6 +64,7 @@ class Question:
     keep_scan: bool
     fit: BinFit
     evaluator: Evaluator
+    still_camera: FloatArray | None = None
 
     @property
     def different_place_m(self) -> float:
@@ -71,16 +80,27 @@ class Question:
         outside = self.region.outside(np.array(pose))
         if outside:
             return f"{outside} is outside the region"
-        contact = self.fit.contact(self.T_base_bin(pose))
-        return "" if contact is None else contact.reason
+        T_base_bin = self.T_base_bin(pose)
+        contact = self.fit.contact(T_base_bin)
+        if contact is not None:
+            return contact.reason
+        if self.still_camera is None:
+            return ""
+        seen = is_in_picture(self.loaded.cell, self.still_camera, T_base_bin)
+        return "" if seen else OUT_OF_SIGHT
 
     def can_be_imaged(self, pose: Pose) -> bool:
-        """Whether some scan configuration, or the one that stays, images the bin."""
-        if self.keep_scan:
+        """Whether some scan configuration, or the one that stays, images the bin.
+
+        A camera on the tool is taken at its word by whoever keeps the configuration.
+        """
+        if self.keep_scan and self.still_camera is None:
             return True
         changed = self.loaded.with_changes(bin_pose=self.T_base_bin(pose))
-        found = imaging_configurations(self.moving.with_bin_of(changed))
-        return next(found, None) is not None
+        scene = self.moving.with_bin_of(changed)
+        if self.keep_scan:
+            return not picture_of(scene, scene.scan_configuration)
+        return next(imaging_configurations(scene), None) is not None
 
     @property
     def start(self) -> FloatArray | None:

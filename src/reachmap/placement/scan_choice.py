@@ -27,7 +27,7 @@ class ScanChoice:
     score : PoseScore
         Of the bin, seen from it.
     is_new : bool
-        Whether it was searched for; otherwise it is the cell's own.
+        Whether it differs from the cell's own.
     """
 
     q: FloatArray
@@ -44,7 +44,7 @@ def choose_scan(placed: PlacedScene, evaluator: Evaluator) -> ScanChoice | None:
     Parameters
     ----------
     placed : PlacedScene
-        Of a cell with a camera on the tool.
+        Of a cell with a camera on the tool, or one that stands.
     evaluator : Evaluator
 
     Returns
@@ -56,6 +56,10 @@ def choose_scan(placed: PlacedScene, evaluator: Evaluator) -> ScanChoice | None:
     finalists = list(islice(found, FINALISTS))
     if not finalists:
         return None
+    own = placed.scene.scan_configuration
+    if np.array_equal(finalists[0], own):
+        # A camera that stands sees the bin past the arm as the cell has it.
+        finalists = [own]
     mapped = evaluator.evaluate([placed.pose] * len(finalists), np.array(finalists))
     scored = [
         (e.score, q)
@@ -67,4 +71,4 @@ def choose_scan(placed: PlacedScene, evaluator: Evaluator) -> ScanChoice | None:
     best = max(score.score for score, _ in scored)
     near = [pair for pair in scored if pair[0].score >= best - EQUAL_POINTS]
     score, q = min(near, key=lambda pair: pair[0].path_length_rad)
-    return ScanChoice(q=q, score=score, is_new=True)
+    return ScanChoice(q=q, score=score, is_new=not np.array_equal(q, own))

@@ -44,6 +44,8 @@ def placement_settings() -> dict[str, Any]:
             "border": viewpoints.BORDER,
             "finalists": scan_choice.FINALISTS,
             "apart_rad": imaging.APART_RAD,
+            "parking_turns_deg": list(imaging.PARKING_TURNS_DEG),
+            "parking_samples": imaging.PARKING_SAMPLES,
             "equal_points": scan_choice.EQUAL_POINTS,
         },
     }

@@ -21,7 +21,7 @@ from reachmap.scans.bin_scan import (
 )
 from reachmap.scans.document import checking_settings, scan_document
 from reachmap.scans.ik_survey import survey_frames
-from reachmap.tools.options import cell_of_artefact, with_seed
+from reachmap.tools.options import cell_of_artefact, warn_of_nothing, with_seed
 from reachmap.tools.prologue import (
     check_scan_output,
     path_of_cell,
@@ -90,6 +90,7 @@ def bin_scan(
     outcome = run_scan(
         bin_work(scene, document), output=output, options=run, label="bin-scan"
     )
+    warn_of_nothing(outcome.artefact, output)
     return outcome.artefact  # type: ignore[no-any-return]
 
 

@@ -12,6 +12,7 @@ from reachmap.cell.loading import LoadedCell, read_cell
 from reachmap.cell.model.shapes import shape_text
 from reachmap.core.scene import Scene
 from reachmap.geometry import AXES, tilt_rad
+from reachmap.placement.mapped.imaging import picture_of
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -138,9 +139,19 @@ def check_loaded(loaded: LoadedCell) -> CellCheck:
         safety_margin_m=cell.collision.safety_margin_m,
         test_frames=cell.workspace_scan.count(),
         test_grasps=cell.bin_scan.count(),
-        warnings=loaded.warnings,
+        warnings=(*loaded.warnings, *_picture(scene)),
         problems=scene.scan_problems(),
     )
+
+
+def _picture(scene: Scene) -> list[str]:
+    """What keeps the camera from seeing the bin at the scan configuration."""
+    if scene.loaded.cell.camera is None:
+        return []
+    wrong = picture_of(scene, scene.scan_configuration)
+    if not wrong:
+        return []
+    return [f"{scene.loaded.source}: {wrong}, at the scan configuration"]
 
 
 def _joints(scene: Scene) -> tuple[JointRow, ...]:

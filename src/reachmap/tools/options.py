@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from reachmap.cell.loading import cell_from_json
-from reachmap.maps import Provenance
+from reachmap.maps import BinMap, Provenance, WorkspaceMap
+from reachmap.maps.summary.nothing import why_nothing
 from reachmap.runtime.options import RunOptions
 from reachmap.runtime.store import store_path
 
@@ -15,6 +17,9 @@ __all__ = ["RunOptions", "cell_of_artefact", "with_seed", "written_by"]
 
 if TYPE_CHECKING:
     from reachmap.cell.loading import LoadedCell
+
+
+logger = logging.getLogger(__name__)
 
 
 def with_seed(overrides: Sequence[str], seed: int | None) -> tuple[str, ...]:
@@ -50,3 +55,10 @@ def cell_of_artefact(
         files_sha256=provenance.files_sha256,
         source=source,
     )
+
+
+def warn_of_nothing(record: WorkspaceMap | BinMap | None, output: Path) -> None:
+    """Say on stderr why a map has nothing reachable, if it has nothing."""
+    why = "" if record is None else why_nothing(record)
+    if why:
+        logger.warning("%s: %s", output, why)

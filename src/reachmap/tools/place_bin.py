@@ -32,6 +32,7 @@ from reachmap.placement.decision import (
     Outcome,
     decide_as_given,
     decide_by_paper,
+    refuse_nothing,
     settle,
 )
 from reachmap.placement.mapped.evaluator import open_evaluator
@@ -84,7 +85,8 @@ class PlacementChoice:
     top : int
         Different places that are mapped with the bin in the scene.
     keep_scan_configuration : bool
-        Leave the cell's own, as is also done without a camera on the tool.
+        Leave the cell's own, as is also done without a camera, or with one on a link
+        between base and tool.
     """
 
     rule: str = "search"
@@ -166,12 +168,15 @@ def place_bin(
             region=region,
             scene=scene,
             moving=Scene.build(loaded, with_bin=True, bin_moves=True),
+            still_camera=_still_camera(scene),
             keep_scan=keep_scan,
             fit=BinFit(scene.robot, loaded, q),
             evaluator=evaluator,
         )
         with clock.phase("decide"):
             decision = _decide(question, choice)
+            if choice.bin_pose is None:
+                refuse_nothing(question, decision)
         with clock.phase("settle"):
             outcome = settle(question, decision)
         clock.add_cpu("workers", evaluator.cpu_s if run.workers > 1 else 0.0)
@@ -180,6 +185,14 @@ def place_bin(
     if picture is not None:
         _draw(picture, placement, workspace_map, question, run)
     return placement
+
+
+def _still_camera(scene: Scene) -> FloatArray | None:
+    """Where a camera is that the tool does not carry, in robot_base, or None."""
+    if scene.loaded.cell.camera is None:
+        return None
+    camera = Camera(scene.robot, scene.loaded)
+    return None if camera.is_carried else camera.T_base_camera(scene.scan_configuration)
 
 
 def _check(choice: PlacementChoice) -> None:
@@ -306,11 +319,7 @@ def _camera_view(placement: BinPlacement, question: Question) -> FloatArray | No
     if cell.camera is None:
         return None
     camera = Camera(scene.robot, question.loaded)
-    if not camera.is_carried:
-        return None
-    T_base_camera = (
-        scene.kinematics.forward(placement.scan_configuration) @ camera.T_tcp_camera
-    )
+    T_base_camera = camera.T_base_camera(placement.scan_configuration)
     T_level_camera = inverse_transform(placement.T_base_level) @ T_base_camera
     rim = float(placement.candidate_pose[placement.chosen, 2]) + cell.bin.inner[2]
     return picture_corners(T_level_camera, cell.camera, rim)

@@ -23,7 +23,7 @@ from reachmap.scans.document import checking_settings, scan_document
 from reachmap.scans.ik_survey import survey_frames
 from reachmap.scans.workspace_per_frame import per_frame_work, plan_frames
 from reachmap.scans.workspace_roadmap import connect_survey, roadmap_work
-from reachmap.tools.options import with_seed
+from reachmap.tools.options import warn_of_nothing, with_seed
 from reachmap.tools.prologue import (
     check_scan_output,
     path_of_cell,
@@ -92,6 +92,7 @@ def workspace_scan(
     else:
         work = roadmap_work(scene, document)
     outcome = run_scan(work, output=output, options=run, label="workspace-scan")
+    warn_of_nothing(outcome.artefact, output)
     return outcome.artefact  # type: ignore[no-any-return]
 
 

@@ -24,7 +24,9 @@ FieldOfView = Annotated[float, Field(gt=0, lt=180, allow_inf_nan=False)]
 class CameraSpec(PoseSpec):
     """The camera's optical frame: z into the scene, x to the right of the image."""
 
-    parent: Name = Field(description="URDF frame the camera is fixed to.")
+    parent: Name = Field(
+        description="What it is fixed to: a URDF frame, world, robot_base or a body."
+    )
     range_m: LengthRange = Field((0.5, 0.6), description="Working distance [m].")
     field_of_view_deg: tuple[FieldOfView, FieldOfView] = Field(
         (57.0, 36.0), description="Full angles along image x and y [deg]."

@@ -6,9 +6,11 @@ from typing import TYPE_CHECKING
 
 import coal
 import numpy as np
+import pinocchio as pin
 
 from reachmap._typing import FloatArray
-from reachmap.core.collision.bodies import build_geometry
+from reachmap.cell.model.cell import Cell
+from reachmap.core.collision.bodies import ROOT, build_geometry
 from reachmap.core.collision.shapes import convex_hull
 from reachmap.core.collision.static_bodies import (
     PlacedBodies,
@@ -24,6 +26,18 @@ if TYPE_CHECKING:
 LENS_RADIUS_M = 0.001
 
 
+def camera_placement(robot: RobotModel, cell: Cell) -> tuple[int, FloatArray]:
+    """Joint that carries a cell's camera (0: it stands), and T_joint_camera (4, 4)."""
+    assert cell.camera is not None
+    parent, T_parent = cell.camera.parent, np.eye(4)
+    for body in cell.bodies:
+        if body.name == parent:
+            parent, T_parent = body.attach_to, body.pose.matrix()
+            break
+    joint, T_joint_frame = robot.frame_placement(parent)
+    return joint, np.asarray(T_joint_frame @ T_parent @ cell.camera.matrix())
+
+
 class Camera:
     """A cell's camera, and the bodies that may stand in its way.
 
@@ -37,6 +51,8 @@ class Camera:
     ----------
     is_carried : bool
         Whether it moves with the TCP.
+    stands : bool
+        Whether no joint moves it.
     T_tcp_camera : array, shape (4, 4)
         Optical frame in the TCP's, for a camera that is carried.
     """
@@ -47,11 +63,18 @@ class Camera:
             raise ValueError("this cell has no camera")
         self._robot = robot
         self._bodies = build_geometry(robot, loaded, with_bin=True)
-        self._joint, T_joint_frame = robot.frame_placement(spec.parent)
-        self._T_joint_camera = T_joint_frame @ spec.matrix()
+        self._joint, self._T_joint_camera = camera_placement(robot, loaded.cell)
+        self.stands = self._joint == ROOT
         self.is_carried = self._joint == robot.tcp_joint
         self.T_tcp_camera = inverse_transform(robot.T_joint_tcp) @ self._T_joint_camera
         self._around_lens = self._bodies_around_lens()
+
+    def T_base_camera(self, q: FloatArray) -> FloatArray:  # noqa: N802
+        """Optical frame in robot_base with the arm at q, shape (4, 4)."""
+        data = self._robot.model.createData()
+        pin.forwardKinematics(self._robot.model, data, q)
+        T_root_joint = np.array(data.oMi[self._joint].homogeneous)
+        return np.asarray(self._robot.T_base_root @ T_root_joint @ self._T_joint_camera)
 
     def hidden_by(
         self, q: FloatArray, T_base_camera: FloatArray, corners: FloatArray

@@ -15,6 +15,7 @@ import pinocchio as pin
 from reachmap._typing import FloatArray, IntArray
 from reachmap.cell.model.shapes import triangles_of
 from reachmap.core.collision.bodies import build_geometry
+from reachmap.core.collision.camera import camera_placement
 from reachmap.core.robot.model import RobotModel
 
 if TYPE_CHECKING:
@@ -130,8 +131,7 @@ class SolidCell:
         camera = self.loaded.cell.camera
         if camera is None:
             return None
-        joint, T_joint_parent = self.robot.frame_placement(camera.parent)
-        return joint, T_joint_parent @ camera.matrix()
+        return camera_placement(self.robot, self.loaded.cell)
 
 
 def _kind(name: str, joint: int, own: set[str]) -> Kind:

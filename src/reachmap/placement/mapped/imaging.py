@@ -8,13 +8,12 @@ from functools import lru_cache
 import numpy as np
 
 from reachmap._typing import FloatArray, IntArray
-from reachmap.cell.model.cell import CameraSpec
+from reachmap.cell.model.cell import CameraSpec, Cell
 from reachmap.core.collision.camera import Camera
 from reachmap.core.scene import Scene
 from reachmap.geometry import inverse_transform
 from reachmap.placement.mapped.viewpoints import (
     NOT_SEEN,
-    View,
     camera_poses,
     seen_from,
     view_of,
@@ -23,12 +22,20 @@ from reachmap.placement.mapped.viewpoints import (
 APART_RAD = 0.4
 INSET_M = 0.001
 UNSEEN = "no scan configuration images the bin"
+OUT_OF_SIGHT = "the camera does not see the bin"
+# Where the arm may wait while a camera that stands takes its picture, besides the
+# cell's own scan configuration: that with the first joint turned, and random ones.
+PARKING_TURNS_DEG = (30.0, -30.0, 60.0, -60.0, 90.0, -90.0, 135.0, -135.0, 180.0)
+PARKING_SAMPLES = 64
 
 
 def can_choose(scene: Scene) -> bool:
-    """Whether the cell has a camera that moves with the tool."""
+    """Whether configurations can be sought: the camera is on the tool, or stands."""
     loaded = scene.loaded
-    return loaded.cell.camera is not None and Camera(scene.robot, loaded).is_carried
+    if loaded.cell.camera is None:
+        return False
+    camera = Camera(scene.robot, loaded)
+    return camera.is_carried or camera.stands
 
 
 def imaging_configurations(
@@ -36,14 +43,16 @@ def imaging_configurations(
 ) -> Iterator[FloatArray]:
     """Configurations that image the bin, far from each other, most promising first.
 
-    They see the pick volume from within the camera's range, with nothing in between,
-    and are free of collision. Where the rim or a line of sight to a corner is missing,
-    others come first; then those nearest to the grasps.
+    The camera sees the pick volume from within its range, with nothing in between, and
+    the arm is free of collision. A camera on the tool is moved there: where the rim or
+    a line of sight to a corner is missing, others come first; then those nearest to the
+    grasps. A camera that stands either sees the bin or does not, and the arm waits
+    where it is not in the way: in the cell's own scan configuration if it can.
 
     Parameters
     ----------
     scene : Scene
-        Of a cell with a camera on the tool, with the bin.
+        Of a cell with a camera on the tool or one that stands, with the bin.
     goals : array, shape (n, dof), optional
         Free configurations at the grasps [rad].
     frame : int array, shape (n,), optional
@@ -54,12 +63,14 @@ def imaging_configurations(
     array, shape (dof,)
         [rad].
     """
-    cell, T_base_bin = scene.loaded.cell, scene.T_base_bin
+    cell = scene.loaded.cell
     assert cell.camera is not None
-    view = view_of(cell.bin.inner, cell.bin_scan.layers)
     camera = Camera(scene.robot, scene.loaded)
+    if camera.stands:
+        yield from _parking_configurations(scene, camera, goals, frame)
+        return
     T_bin_camera, missing = _views(cell.bin.inner, cell.bin_scan.layers, cell.camera)
-    T_base_camera = T_base_bin @ T_bin_camera
+    T_base_camera = scene.T_base_bin @ T_bin_camera
     Q, pose = scene.kinematics.solve_many(
         T_base_camera @ inverse_transform(camera.T_tcp_camera),
         windings=False,
@@ -67,7 +78,7 @@ def imaging_configurations(
     )
     free = scene.checker.free_mask(Q)
     Q, pose = Q[free], pose[free]
-    corners = _inset(view, T_base_bin)
+    corners = _corners(scene)
     chosen: list[FloatArray] = []
     for k in np.lexsort((_farness(Q, goals, frame), missing[pose])):
         q = Q[k]
@@ -77,6 +88,58 @@ def imaging_configurations(
             continue
         chosen.append(q)
         yield q
+
+
+def picture_of(scene: Scene, q: FloatArray) -> str:
+    """What is wrong with the picture of the bin that a scene's camera takes, or "".
+
+    Parameters
+    ----------
+    scene : Scene
+        Of a cell with a camera, with the bin.
+    q : array, shape (dof,)
+        Where the arm is [rad].
+    """
+    camera = Camera(scene.robot, scene.loaded)
+    T_base_camera = camera.T_base_camera(q)
+    if not is_in_picture(scene.loaded.cell, T_base_camera, scene.T_base_bin):
+        return OUT_OF_SIGHT
+    body = camera.hidden_by(q, T_base_camera, _corners(scene))
+    return f"{body} hides part of the bin from the camera" if body else ""
+
+
+def is_in_picture(
+    cell: Cell, T_base_camera: FloatArray, T_base_bin: FloatArray
+) -> bool:
+    """Whether a camera has the pick volume of a bin in its picture and in its range."""
+    assert cell.camera is not None
+    view = view_of(cell.bin.inner, cell.bin_scan.layers)
+    T_bin_camera = inverse_transform(T_base_bin) @ T_base_camera
+    return bool(seen_from(T_bin_camera[None], view, cell.camera)[0] < NOT_SEEN)
+
+
+def _parking_configurations(
+    scene: Scene, camera: Camera, goals: FloatArray | None, frame: IntArray | None
+) -> Iterator[FloatArray]:
+    robot, own = scene.robot, scene.scan_configuration
+    T_base_camera = camera.T_base_camera(own)
+    if not is_in_picture(scene.loaded.cell, T_base_camera, scene.T_base_bin):
+        return
+    turned = np.tile(own, (len(PARKING_TURNS_DEG), 1))
+    turned[:, 0] += np.radians(PARKING_TURNS_DEG)
+    random = np.random.default_rng(scene.loaded.cell.seed)
+    others = random.uniform(
+        robot.lower_rad, robot.upper_rad, (PARKING_SAMPLES, robot.dof)
+    )
+    others = np.vstack([turned, others])
+    inside = (others >= robot.lower_rad) & (others <= robot.upper_rad)
+    others = others[inside.all(axis=1)]
+    others = others[np.argsort(_farness(others, goals, frame), kind="stable")]
+    Q = np.vstack([own, others])
+    corners = _corners(scene)
+    for q in Q[scene.checker.free_mask(Q)]:
+        if not camera.hidden_by(q, T_base_camera, corners):
+            yield q
 
 
 @lru_cache(maxsize=4)
@@ -111,11 +174,13 @@ def _farness(
     return np.round([float(distances.mean()) for distances in nearest], 6)
 
 
-def _inset(view: View, T_base_bin: FloatArray) -> FloatArray:
+def _corners(scene: Scene) -> FloatArray:
     """Corners of the pick volume in robot_base, clear of walls and bottom."""
-    middle = view.volume.mean(axis=0)
-    half = np.maximum(np.abs(view.volume - middle) - INSET_M, INSET_M)
-    corners = middle + np.sign(view.volume - middle) * half
+    cell, T_base_bin = scene.loaded.cell, scene.T_base_bin
+    volume = view_of(cell.bin.inner, cell.bin_scan.layers).volume
+    middle = volume.mean(axis=0)
+    half = np.maximum(np.abs(volume - middle) - INSET_M, INSET_M)
+    corners = middle + np.sign(volume - middle) * half
     # A pick volume without height is looked at just above the bottom.
     corners[:, 2] = np.maximum(corners[:, 2], INSET_M)
     return np.asarray(corners @ T_base_bin[:3, :3].T + T_base_bin[:3, 3])
