@@ -28,7 +28,7 @@ from reachmap.core.kinematics.solutions import (
     joined,
     wrapped,
 )
-from reachmap.core.kinematics.solvers.arm import FULL_AXES, Arm, Way
+from reachmap.core.kinematics.solvers.arm import Arm, Way
 from reachmap.core.kinematics.solvers.numeric import NumericSolver
 from reachmap.geometry import transform_from_parts
 
@@ -42,10 +42,8 @@ _JUMP_RAD = 0.1
 # A pose with so many solutions has all its branches.
 _ALL_BRANCHES = 8
 
-# Misses [m or rad] up to which a row may stand for a solution that the closed form
-# lost, and the share of the self-test below which no row at all may do so, too.
-_NEARLY = 0.5
-_TRUSTED = 0.95
+# Share of the self-test above which a pose has no solution if the closed form has none.
+_TRUSTED = 0.98
 
 # Frames per block, which bounds the memory of the pairwise comparison.
 _BLOCK = 2048
@@ -123,18 +121,14 @@ class AnalyticSolver:
             poses = T[start : start + _BLOCK]
             raw = self._rows(poses)
             rows = self._with_singular(self._meeting(raw, poses), raw, poses)
-            Q, frame = rows if self.complete else self._with_lost(rows, raw, poses)
-            tables.append((Q, frame + start))
+            if self._form.score < _TRUSTED * SELF_TESTS:
+                rows = self._with_lost(rows, poses)
+            tables.append((rows[0], rows[1] + start))
         return joined(tables, self._chain.dof)
 
-    def _with_lost(self, rows: Rows, raw: Rows, T: FloatArray) -> Rows:
-        """Seek numerically what the closed form nearly found, or may well lose."""
-        nearest = np.full(len(T), np.inf)
-        missed = matrix_difference(T[raw[1]], self._chain.forward_many(raw[0]))
-        np.minimum.at(nearest, raw[1], missed)
-        if self._chain.dof < FULL_AXES or self._form.score < _TRUSTED * SELF_TESTS:
-            nearest[np.isinf(nearest)] = 0.0
-        missing = nearest <= _NEARLY
+    def _with_lost(self, rows: Rows, T: FloatArray) -> Rows:
+        """Seek numerically what the closed form may have lost."""
+        missing = np.ones(len(T), bool)
         missing[rows[1]] = False
         frames = np.flatnonzero(missing)
         if not len(frames):

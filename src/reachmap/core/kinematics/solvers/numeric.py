@@ -38,8 +38,10 @@ _HOPELESS = 0.4
 _LAST_STEPS = 30
 _PATIENCE = 4
 
-# Poses that are nearly met, or met outside the limits only, get so many times the
-# starts again, and steps that stay within the limits.
+# Poses that are nearly met [m or rad], or met outside the limits only, get so many
+# times the starts again, and steps that stay within the limits. A larger miss is that
+# of a pose out of reach nearly always.
+_HOPEFUL = 1e-3
 _MORE = 4
 
 # Arms of so few joints need no table.
@@ -109,7 +111,7 @@ class NumericSolver:
         allowed = can_be_within(
             rows[0], self._arm.lower, self._arm.upper, self._chain.is_revolute
         )
-        hopeful = missed < _NEAR
+        hopeful = missed < _HOPEFUL
         hopeful[rows[1][allowed]] = False
         again = np.flatnonzero(hopeful)
         if self._table is None or not len(again):
