@@ -279,13 +279,33 @@ def _placement_lines(summary: PlacementSummary) -> list[str]:
         "",
         *table_lines(rows, "<>>>>>>>"),
         "",
-        *fact_lines([("margin to -5 points", margin), ("scan pose [deg]", scan)]),
+        *fact_lines(
+            [
+                ("margin to -5 points", margin),
+                *_tolerance_facts(summary),
+                ("scan pose [deg]", scan),
+            ]
+        ),
     ]
     if summary.excluded:
         excluded = [(str(n), reason) for reason, n in summary.excluded.items()]
         lines += ["", "Excluded candidates"]
         lines += table_lines(excluded[:PAIRS_SHOWN], "><")
     return lines
+
+
+def _tolerance_facts(summary: PlacementSummary) -> list[tuple[str, str]]:
+    """What the chosen pose keeps when the bin is off, and what it stands on."""
+    facts = []
+    if summary.tolerance_shift_m is not None and summary.worst_score is not None:
+        shift, turn = 1e3 * summary.tolerance_shift_m, summary.tolerance_turn_deg
+        off = f"{shift:.3g} mm and {turn:.3g} deg off"
+        facts.append(("worst score", f"{percent_text(summary.worst_score)} %, {off}"))
+    if summary.score_error is not None:
+        facts.append(("error of the score", f"{summary.score_error:.2g} points"))
+    if summary.support is not None:
+        facts.append(("stands on", summary.support or "nothing"))
+    return facts
 
 
 def _candidate_row(name: str, item: CandidateSummary) -> list[str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from reachmap.maps.summary.directions import reached_shares
 from reachmap.maps.summary.placement import summarise_placement
 from reachmap.maps.summary.statistics import best_level, level_means, saturation_of
 from reachmap.report.blocks import Tile
@@ -79,12 +80,15 @@ def _share(run: RunFolder) -> Tile:
         return _absent(question, "There is no bin map in this folder.")
     found = saturation_of(run.bin_map)
     attempts = len(found.attempts)
+    shares = reached_shares(run.bin_map)
     return _tile(
         question,
         percent(float(found.share[-1])),
         f"{int(found.hits[-1])} of {count(found.total, 'test grasp')} after "
         f"{count(attempts, 'attempt')} each "
-        f"(95 % interval {interval(float(found.low[-1]), float(found.high[-1]))}).",
+        f"(95 % interval {interval(float(found.low[-1]), float(found.high[-1]))}); "
+        f"{percent(shares.directions)} of the directions with at least one roll, "
+        f"{percent(shares.points)} of the points from at least one direction.",
         f"After one attempt: {percent(float(found.share[0]))}." if attempts > 1 else "",
     )
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from reachmap._typing import FloatArray
 from reachmap.maps.format.placement import is_turn
 from reachmap.maps.records import BinPlacement
 
@@ -44,6 +45,12 @@ class PlacementSummary:
         Poses that were considered, and those with the bin in the scene.
     excluded : mapping
         Reason to number of candidates, the most frequent first.
+    tolerance_shift_m, tolerance_turn_deg, worst_score : float or None
+        The chosen pose's least score while the bin is off by as much [percent].
+    score_error : float or None
+        Standard error of the chosen pose's score [percent].
+    support : str or None
+        Body that the bin stands on, "" if it stands on none.
     """
 
     rule: str
@@ -55,11 +62,17 @@ class PlacementSummary:
     candidates: int
     exact: int
     excluded: dict[str, int]
+    tolerance_shift_m: float | None
+    tolerance_turn_deg: float | None
+    worst_score: float | None
+    score_error: float | None
+    support: str | None
 
 
 def summarise_placement(record: BinPlacement) -> PlacementSummary:
     """Name the chosen pose, its margin and its rivals."""
     degrees = np.degrees(record.scan_configuration)
+    tolerance = record.tolerance
     return PlacementSummary(
         rule=record.rule,
         chosen=_candidate(record, record.chosen),
@@ -75,7 +88,18 @@ def summarise_placement(record: BinPlacement) -> PlacementSummary:
         candidates=len(record.score),
         exact=int(record.exact.sum()),
         excluded=dict(Counter(text for text in record.reason if text).most_common()),
+        tolerance_shift_m=None if tolerance is None else tolerance[0],
+        tolerance_turn_deg=None
+        if tolerance is None
+        else float(np.degrees(tolerance[1])),
+        worst_score=_of_chosen(record, record.worst_score),
+        score_error=_of_chosen(record, record.score_error),
+        support=record.support,
     )
+
+
+def _of_chosen(record: BinPlacement, values: FloatArray | None) -> float | None:
+    return None if values is None else float(values[record.chosen])
 
 
 def _candidate_or_none(record: BinPlacement, row: int) -> CandidateSummary | None:
