@@ -16,6 +16,8 @@ from reachmap.view.playback import (
     way_points,
 )
 from reachmap.view.points import shortest_paths
+from tests.support.synthetic_maps import synthetic_bin_map
+from tests.support.synthetic_parts import bin_with_parts
 from tests.support.toy_artefacts import toy_bin_map
 
 
@@ -119,3 +121,14 @@ def test_a_path_is_found_by_its_test_grasp() -> None:
     without = np.argwhere(record.path_found.sum(axis=-1) == 0)
     with pytest.raises(SettingsError, match="no path to this test grasp"):
         find_path(record, tuple(int(i) for i in without[0]))
+
+
+def test_the_best_path_is_the_one_to_watch() -> None:
+    """Also where it is the roadmap's own, which is no attempt."""
+    record = bin_with_parts(
+        synthetic_bin_map(0.3, connected=np.ones((1, 4, 5, 6), bool))
+    )
+    np.testing.assert_array_equal(shortest_paths(record), record.best.row)
+    assert len(choose_paths(record)) == 4
+    own = tuple(np.argwhere(~record.path_found.any(axis=-1))[0])
+    assert record.paths.index[find_path(record, own)].tolist() == [*own, -1]

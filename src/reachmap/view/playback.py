@@ -142,7 +142,10 @@ def choose_paths(record: BinMap) -> tuple[int, ...]:
     rows = shortest_paths(record)
     length = np.full(rows.shape, np.inf)
     has = rows >= 0
-    length[has] = record.path_length[tuple(record.paths.index[rows[has]].T)]
+    if record.best is not None:
+        length[has] = record.best.path_length[has]
+    else:
+        length[has] = record.path_length[tuple(record.paths.index[rows[has]].T)]
     chosen = []
     for north in (True, False):
         for east in (False, True):

@@ -226,6 +226,8 @@ def _in_base(points: FloatArray, T_base_own: FloatArray) -> FloatArray:
 
 def shortest_paths(record: BinMap) -> IntArray:
     """Row of the shortest stored path of each test grasp, shape (nl, ny, nx, no)."""
+    if record.best is not None:
+        return record.best.row
     rows = np.full(record.status.shape, -1, np.int64)
     index = record.paths.index
     length = record.path_length[tuple(index.T)]

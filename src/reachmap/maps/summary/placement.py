@@ -73,6 +73,7 @@ def summarise_placement(record: BinPlacement) -> PlacementSummary:
     """Name the chosen pose, its margin and its rivals."""
     degrees = np.degrees(record.scan_configuration)
     tolerance = record.tolerance
+    turn_deg = None if tolerance is None else float(np.degrees(tolerance[1]))
     return PlacementSummary(
         rule=record.rule,
         chosen=_candidate(record, record.chosen),
@@ -89,9 +90,7 @@ def summarise_placement(record: BinPlacement) -> PlacementSummary:
         exact=int(record.exact.sum()),
         excluded=dict(Counter(text for text in record.reason if text).most_common()),
         tolerance_shift_m=None if tolerance is None else tolerance[0],
-        tolerance_turn_deg=None
-        if tolerance is None
-        else float(np.degrees(tolerance[1])),
+        tolerance_turn_deg=turn_deg,
         worst_score=_of_chosen(record, record.worst_score),
         score_error=_of_chosen(record, record.score_error),
         support=record.support,
