@@ -28,11 +28,19 @@ log = logging.getLogger(__name__)
 )
 @cell_option
 @output_option("bin.h5")
+@click.option(
+    "--attempts",
+    type=click.Choice(["roadmap", "planner"]),
+    default=None,
+    help="Paths that branch off a shared network of routes, or the cell's planner from "
+    "scratch each time, as in the paper; default: the cell's bin_scan.attempts.",
+)
 @scan_options
 def command(
     placement: Path | None,
     cell: str | None,
     output: Path,
+    attempts: str | None,
     overrides: tuple[str, ...],
     seed: int | None,
     workers: int,
@@ -50,7 +58,7 @@ def command(
     holds the cell with its bin and scan configuration, so nothing else is needed.
     With --cell, or where there is no placement.h5, the bin stands where the cell has
     it: the cell named, that of workspace.h5 in this folder, or the shipped UR5 cell.
-    Each test grasp is planned several times and every attempt is kept. Ctrl-C loses
+    Each test grasp gets several attempts and every one is kept. Ctrl-C loses
     nothing: the same command goes on.
 
     Example: reachmap bin-scan placement.h5 --set bin_scan.repeats=1
@@ -59,6 +67,8 @@ def command(
     from reachmap.tools.bin_scan import bin_scan, estimate_bin_scan, summary_of_bin
     from reachmap.tools.options import written_by
 
+    if attempts is not None:
+        overrides = (*overrides, f"bin_scan.attempts={attempts}")
     check_scan_options(shard, executor, dry_run=dry_run)
     if placement is not None:
         unused("cell", because="PLACEMENT holds the cell; leave one of them out")

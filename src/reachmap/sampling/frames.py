@@ -64,6 +64,28 @@ class FrameGrid:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class FrameList:
+    """Frames that are no product of points and orientations.
+
+    Attributes
+    ----------
+    T : array, shape (n, 4, 4)
+        T_base_tcp.
+    """
+
+    T: FloatArray
+
+    @property
+    def size(self) -> int:
+        """Number of frames."""
+        return len(self.T)
+
+    def transforms_at(self, flat: IntArray | slice) -> FloatArray:
+        """T_base_tcp of some frames, shape (n, 4, 4)."""
+        return self.T[flat]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class CubeFrames:
     """A cube of the workspace scan and its test frames."""
 

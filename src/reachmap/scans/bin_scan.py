@@ -10,183 +10,28 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from reachmap._typing import BoolArray, CodeArray, FloatArray, IntArray
+from reachmap._typing import FloatArray
 from reachmap.cell.model.cell import Cell
 from reachmap.core.kinematics.windings import Windings
 from reachmap.core.planning.planner import PlanResult
+from reachmap.core.planning.timing import path_length_rad
 from reachmap.core.scene import Scene
-from reachmap.maps import BinMap, PathStore, RunInfo, Stamp, Status, write_bin_map
-from reachmap.maps.parts import ApproachTimes, Effort
-from reachmap.maps.records import freeze
+from reachmap.maps import BinMap, RunInfo, Status, write_bin_map
 from reachmap.runtime.job import Job, Kind, Stages, Work, blocks
-from reachmap.runtime.progress import Progress
-from reachmap.sampling.frames import FrameGrid, bin_test_frames
-from reachmap.scans.document import journal_settings, provenance_from_document
-from reachmap.scans.ik_survey import Survey, SurveyContext, survey_in_stages
-from reachmap.scans.measured import (
-    MEASURED,
-    SECONDS_PER_CHECK,
-    Meter,
-    attempt_seed,
+from reachmap.scans.bin_results import GraspResults, assemble_bin_map
+from reachmap.scans.bin_roadmap import (
+    BinRoadmap,
+    components_from_payload,
+    connected_grasps,
+    grasp_grid,
 )
-from reachmap.scans.workspace_roadmap import connect_survey
+from reachmap.scans.document import journal_settings
+from reachmap.scans.ik_survey import Survey
+from reachmap.scans.measured import MEASURED, Meter, attempt_seed
+from reachmap.scans.routes import RouteAttempts
 
 if TYPE_CHECKING:
     from reachmap.cell.loading import LoadedCell
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class GraspResults:
-    """What became of test grasps and their attempts.
-
-    Attributes
-    ----------
-    status, n_ik, n_ik_free, connected : uint8 array, shape (grasps,)
-    blocking_pair : int array, shape (grasps,)
-    path_found, hit_time_limit : uint8 array, shape (grasps, repeats)
-    checks : int array, shape (grasps, repeats)
-        State checks of the search.
-    measured : array, shape (grasps, repeats, 9)
-        In the order of :data:`~reachmap.scans.measured.MEASURED`.
-    goal_configuration : array, shape (grasps, dof)
-        Where the shortest path ends [rad].
-    configuration : array, shape (points, dof)
-        Way-points of all paths, one path after another.
-    row_size, planned_size : int array, shape (paths,)
-    place : int array, shape (paths, 2)
-        Grasp and repeat of each path.
-    """
-
-    status: CodeArray
-    n_ik: CodeArray
-    n_ik_free: CodeArray
-    connected: CodeArray
-    blocking_pair: IntArray
-    path_found: CodeArray
-    hit_time_limit: CodeArray
-    checks: IntArray
-    measured: FloatArray
-    goal_configuration: FloatArray
-    configuration: FloatArray
-    row_size: IntArray
-    planned_size: IntArray
-    place: IntArray
-
-    def __post_init__(self) -> None:
-        freeze(self)
-
-    @classmethod
-    def blank(cls, grasps: int, repeats: int, dof: int, status: Status) -> GraspResults:
-        """Results of grasps that nothing is known of."""
-        return cls(
-            status=np.full(grasps, status, np.uint8),
-            n_ik=np.zeros(grasps, np.uint8),
-            n_ik_free=np.zeros(grasps, np.uint8),
-            connected=np.zeros(grasps, np.uint8),
-            blocking_pair=np.full(grasps, -1, np.int64),
-            path_found=np.zeros((grasps, repeats), np.uint8),
-            hit_time_limit=np.zeros((grasps, repeats), np.uint8),
-            checks=np.zeros((grasps, repeats), np.int64),
-            measured=np.full((grasps, repeats, len(MEASURED)), np.nan),
-            goal_configuration=np.full((grasps, dof), np.nan),
-            configuration=np.zeros((0, dof)),
-            row_size=np.zeros(0, np.int64),
-            planned_size=np.zeros(0, np.int64),
-            place=np.zeros((0, 2), np.int64),
-        )
-
-    @classmethod
-    def join(cls, parts: Sequence[GraspResults]) -> GraspResults:
-        """Results of consecutive grasps, put together."""
-        joined = {
-            name: np.concatenate([getattr(part, name) for part in parts])
-            for name in cls.__slots__
-            if name != "place"
-        }
-        begin = np.cumsum([0, *(len(part.status) for part in parts[:-1])])
-        place = [
-            part.place + np.array([first, 0])
-            for part, first in zip(parts, begin, strict=True)
-        ]
-        return cls(**joined, place=np.concatenate(place))
-
-
-def assemble_bin_map(
-    document: Mapping[str, Any], results: GraspResults, *, run: RunInfo
-) -> BinMap:
-    """Make the map of a scan.
-
-    Parameters
-    ----------
-    document : mapping
-        See :func:`reachmap.scans.document.scan_document`.
-    results : GraspResults
-        Of all test grasps.
-    run : RunInfo
-    """
-    cell = Cell.model_validate_json(document["provenance"]["cell_resolved_json"])
-    T_base_bin = cell.T_base_bin()
-    grid = bin_test_frames(cell, T_base_bin)
-    shape = grid.frames.shape
-
-    def shaped(values: Any) -> Any:
-        return values.reshape(*shape, *values.shape[1:])
-
-    found = (results.status == Status.PATH_FOUND).reshape(shape)
-    known = (results.status != Status.NOT_ATTEMPTED).reshape(shape)
-    with np.errstate(invalid="ignore"):
-        percent = 100.0 * found.sum(-1) / known.sum(-1)
-    quaternion = np.broadcast_to(grid.frames.quaternion_wxyz, (*shape, 4))
-    measured = {
-        name: shaped(results.measured[..., k]) for k, name in enumerate(MEASURED)
-    }
-    times = ApproachTimes(
-        approach=measured.pop("approach_time"), retreat=measured.pop("retreat_time")
-    )
-    return BinMap(
-        T_world_base=cell.robot.base_pose.matrix(),
-        layer=grid.layer,
-        y=grid.y,
-        x=grid.x,
-        bin_pose=T_base_bin,
-        bin_inner=np.array(cell.bin.inner),
-        position=grid.frames.points,
-        quaternion_wxyz=quaternion.copy(),
-        approach_axis=cell.robot.tcp.approach_axis,
-        approach_distance=cell.bin_scan.approach_distance_m,
-        status=shaped(results.status),
-        blocking_pair=shaped(results.blocking_pair),
-        n_ik=shaped(results.n_ik),
-        n_ik_free=shaped(results.n_ik_free),
-        connected=shaped(results.connected),
-        path_found=shaped(results.path_found),
-        hit_time_limit=shaped(results.hit_time_limit),
-        **measured,
-        times=times,
-        effort=Effort(
-            checks=shaped(results.checks), seconds_per_check=SECONDS_PER_CHECK
-        ),
-        goal_configuration=shaped(results.goal_configuration),
-        path_reachability=percent,
-        scan_configuration=np.array(document["scan_configuration"], float),
-        joint_names=tuple(document["joint_names"]),
-        body_pairs=tuple(document["body_pairs"]),
-        paths=_path_store(results, shape),
-        stamp=Stamp(**document["stamp"]),
-        provenance=provenance_from_document(document),
-        run=run,
-    )
-
-
-def _path_store(results: GraspResults, shape: tuple[int, ...]) -> PathStore:
-    where = np.stack(np.unravel_index(results.place[:, 0], shape), axis=1)
-    return PathStore(
-        configuration=results.configuration,
-        row_size=results.row_size,
-        planned_size=results.planned_size,
-        index=np.concatenate([where, results.place[:, 1:]], axis=1).astype(np.int64),
-    )
-
 
 GRASPS_PER_UNIT = 45
 
@@ -196,8 +41,7 @@ class BinContext:
     """What a worker needs: the cell, and what is known of every test grasp."""
 
     loaded: LoadedCell
-    survey: Survey
-    connected: BoolArray
+    known: BinRoadmap
 
 
 def bin_work(scene: Scene, document: Mapping[str, Any]) -> Work:
@@ -221,30 +65,9 @@ def bin_work(scene: Scene, document: Mapping[str, Any]) -> Work:
     )
 
 
-def grasp_grid(scene: Scene) -> FrameGrid:
-    """Test grasps of a scan, in robot_base."""
-    return bin_test_frames(scene.loaded.cell, scene.T_base_bin).frames
-
-
 def planning_job(scene: Scene, stages: Stages) -> Job:
     """Survey the test grasps and connect them; what is left is to plan to each."""
-    loaded, cell = scene.loaded, scene.loaded.cell
-    context = SurveyContext(
-        loaded=loaded,
-        with_bin=True,
-        grids=(grasp_grid(scene),),
-        approach_m=cell.bin_scan.approach_distance_m,
-    )
-    survey = survey_in_stages(context, stages)
-
-    def connect(progress: Progress) -> BoolArray:
-        connection = connect_survey(scene, survey, seed=cell.seed, progress=progress)
-        connected = np.zeros(len(survey.status), bool)
-        connected[connection.roadmap.frames_reached()] = True
-        return connected
-
-    connected = stages.once("connect", connect)
-    whole = BinContext(loaded=loaded, survey=survey, connected=connected)
+    whole = BinContext(loaded=scene.loaded, known=connected_grasps(scene, stages))
     return Job(function=plan_unit, prepare=prepare, context=whole, tally=tally)
 
 
@@ -254,35 +77,56 @@ def prepare(context: BinContext) -> tuple[BinContext, Scene]:
 
 
 def plan_unit(state: tuple[BinContext, Scene], grasps: range) -> dict[str, Any]:
-    """Plan all attempts at the test grasps of one unit."""
+    """Make all attempts at the test grasps of one unit; the first tells evidence."""
     context, scene = state
-    parts = plan_grasps(scene, context.survey, grasps, context.connected[grasps])
-    return dataclasses.asdict(GraspResults.join(parts))
+    payload = dataclasses.asdict(
+        GraspResults.join(plan_grasps(scene, context.known, grasps))
+    )
+    if grasps.start == 0:
+        payload["components"] = dataclasses.asdict(context.known.components)
+    return payload
 
 
 def plan_grasps(
-    scene: Scene, survey: Survey, grasps: Sequence[int], connected: BoolArray
+    scene: Scene, known: BinRoadmap, grasps: Sequence[int]
 ) -> list[GraspResults]:
     """Make all attempts at some test grasps.
-
-    They take turns: a machine that is slow for a moment is then slow for one attempt
-    at each of many, and not for every attempt at one, which would look dear.
 
     Parameters
     ----------
     scene : Scene
-    survey : Survey
+    known : BinRoadmap
     grasps : sequence of int
         Their numbers in the survey, which with the cell's seed make their own.
-    connected : bool array, shape (len(grasps),)
-        Whether the roadmap proves a path.
     """
-    windings, start = Windings(scene.robot), scene.scan_configuration
+    spec, survey = scene.loaded.cell.bin_scan, known.survey
+    attempts = RouteAttempts(scene, survey, known.routes)
+    if spec.attempts == "roadmap":
+        plans = [attempts.at(grasp, spec.repeats) for grasp in grasps]
+    else:
+        plans = plan_from_scratch(scene, survey, grasps)
+    results = []
+    for grasp, made in zip(grasps, plans, strict=True):
+        missed = all(plan.path is None for plan, _ in made)
+        own = attempts.own(grasp) if missed else None
+        results.append(_results(scene, known, grasp, made, own))
+    return results
+
+
+def plan_from_scratch(
+    scene: Scene, survey: Survey, grasps: Sequence[int]
+) -> list[list[tuple[PlanResult, int]]]:
+    """Let the cell's planner make all attempts, as in the paper.
+
+    They take turns: a machine that is slow for a moment is then slow for one attempt
+    at each of many, and not for every attempt at one, which would look dear.
+    """
+    cell, start = scene.loaded.cell, scene.scan_configuration
+    windings = Windings(scene.robot)
     goals = [
         survey.goals_near(survey.goals_of(grasp), start, windings) for grasp in grasps
     ]
     plans: list[list[tuple[PlanResult, int]]] = [[] for _ in grasps]
-    cell = scene.loaded.cell
     for repeat in range(cell.bin_scan.repeats):
         for row, grasp in enumerate(grasps):
             Q, goal = goals[row]
@@ -290,27 +134,22 @@ def plan_grasps(
                 seed = attempt_seed(cell.seed, grasp, repeat)
                 plan = scene.planner.plan(start, Q, seed)
                 plans[row].append((plan, int(goal[plan.goal])))
-    return [
-        _results(scene, survey, grasp, plans[row], connected=bool(connected[row]))
-        for row, grasp in enumerate(grasps)
-    ]
+    return plans
 
 
 def _results(
     scene: Scene,
-    survey: Survey,
+    known: BinRoadmap,
     grasp: int,
     plans: Sequence[tuple[PlanResult, int]],
-    *,
-    connected: bool,
+    own: tuple[FloatArray, int] | None,
 ) -> GraspResults:
-    repeats = scene.loaded.cell.bin_scan.repeats
+    survey, repeats = known.survey, scene.loaded.cell.bin_scan.repeats
     measured = np.full((1, repeats, len(MEASURED)), np.nan)
+    numbers_of_own = np.full((1, len(MEASURED)), np.nan)
     out_of_time = np.zeros((1, repeats), np.uint8)
     checks = np.zeros((1, repeats), np.int64)
-    paths: list[FloatArray] = []
-    planned: list[int] = []
-    place: list[tuple[int, int]] = []
+    found: list[tuple[FloatArray, int, int, int]] = []
     meter = Meter(scene)
     for repeat, (plan, goal) in enumerate(plans):
         out_of_time[0, repeat] = plan.hit_time_limit
@@ -318,12 +157,17 @@ def _results(
         if plan.path is None:
             continue
         way = survey.way_from(goal, plan.path[-1])
-        paths.append(np.vstack([plan.path, way[1:]]))
-        planned.append(len(plan.path))
-        place.append((0, repeat))
         measured[0, repeat] = meter.measured(plan, way)
+        found.append((np.vstack([plan.path, way[1:]]), len(plan.path), repeat, goal))
+    if own is not None:
+        path, goal = own
+        way = survey.way_from(goal, path[-1])
+        numbers_of_own[0] = meter.measured(PlanResult.without_search(path), way)
+        found.append((np.vstack([path, way[1:]]), len(path), -1, goal))
+    best = min(found, key=lambda entry: path_length_rad(entry[0]), default=None)
+    connected = known.routes.over_roadmap(survey, grasp) is not None
     return GraspResults(
-        status=np.array([_status(survey, grasp, plans, connected=connected)], np.uint8),
+        status=np.array([_status(survey, grasp, found=bool(found))], np.uint8),
         n_ik=survey.n_ik[[grasp]],
         n_ik_free=survey.n_ik_free[[grasp]],
         connected=np.array([connected], np.uint8),
@@ -332,35 +176,24 @@ def _results(
         hit_time_limit=out_of_time,
         checks=checks,
         measured=measured,
-        goal_configuration=_shortest_goal(paths, measured, scene.robot.dof),
-        configuration=np.vstack([np.zeros((0, scene.robot.dof)), *paths]),
-        row_size=np.array([len(path) for path in paths], np.int64),
-        planned_size=np.array(planned, np.int64),
-        place=np.array(place, np.int64).reshape(-1, 2),
+        own=numbers_of_own,
+        component=known.component[[grasp]],
+        winning_roll=np.array(
+            [np.nan if best is None else survey.roll_of(grasp, best[3])]
+        ),
+        configuration=np.vstack(
+            [np.zeros((0, scene.robot.dof)), *(entry[0] for entry in found)]
+        ),
+        row_size=np.array([len(entry[0]) for entry in found], np.int64),
+        planned_size=np.array([entry[1] for entry in found], np.int64),
+        place=np.array([(0, entry[2]) for entry in found], np.int64).reshape(-1, 2),
     )
 
 
-def _status(
-    survey: Survey,
-    grasp: int,
-    plans: Sequence[tuple[PlanResult, int]],
-    *,
-    connected: bool,
-) -> int:
-    if not plans:
+def _status(survey: Survey, grasp: int, *, found: bool) -> int:
+    if not len(survey.goals_of(grasp)):
         return int(survey.status[grasp])
-    # A path that the roadmap proves counts, even if every attempt missed it.
-    found = connected or any(plan.path is not None for plan, _ in plans)
     return Status.PATH_FOUND if found else Status.NO_PATH_FOUND
-
-
-def _shortest_goal(
-    paths: Sequence[FloatArray], measured: FloatArray, dof: int
-) -> FloatArray:
-    if not paths:
-        return np.full((1, dof), np.nan)
-    lengths = measured[0, :, 0]
-    return np.array(paths[int(np.argmin(lengths[np.isfinite(lengths)]))][-1:])
 
 
 def tally(payload: Mapping[str, Any]) -> tuple[int, int]:
@@ -385,8 +218,17 @@ def assemble(
     document: Mapping[str, Any], payloads: Sequence[Any], *, run: RunInfo
 ) -> BinMap:
     """Make the map from the payloads of all units."""
-    results = GraspResults.join([GraspResults(**payload) for payload in payloads])
-    return assemble_bin_map(document, results, run=run)
+    parts: list[GraspResults] = []
+    components = None
+    for payload in payloads:
+        fields = dict(payload)
+        evidence = fields.pop("components", None)
+        if evidence is not None:
+            components = components_from_payload(evidence)
+        parts.append(GraspResults(**fields))
+    return assemble_bin_map(
+        document, GraspResults.join(parts), run=run, components=components
+    )
 
 
 KIND = Kind(name="bin_map", blank=blank, assemble=assemble, write=write_bin_map)

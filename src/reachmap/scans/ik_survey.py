@@ -19,7 +19,7 @@ from reachmap.core.planning.roadmap import Goals
 from reachmap.core.scene import Scene
 from reachmap.maps.records import NO_PAIR, Status, freeze
 from reachmap.runtime.job import Job, Stages
-from reachmap.sampling.frames import FrameGrid
+from reachmap.sampling.frames import FrameGrid, FrameList
 
 if TYPE_CHECKING:
     from reachmap.cell.loading import LoadedCell
@@ -48,6 +48,12 @@ class Survey:
         point where there is no approach.
     way_size : int array, shape (goals,)
         Points of each.
+    group : int array, shape (frames,), or None
+        Where the roll is free, frames that differ by roll share their goals: the
+        group of each frame; ``frame`` then counts groups.
+    roll, frame_roll : array, shape (goals,), (frames,), or None
+        Roll of each goal and of each frame about the approach axis, within its group
+        [rad].
     """
 
     status: CodeArray
@@ -57,6 +63,9 @@ class Survey:
     frame: IntArray
     way: FloatArray
     way_size: IntArray
+    group: IntArray | None = None
+    roll: FloatArray | None = None
+    frame_roll: FloatArray | None = None
 
     def __post_init__(self) -> None:
         freeze(self)
@@ -86,6 +95,12 @@ class Survey:
 
     def goals_of(self, frame: int) -> IntArray:
         """Rows of the goals of one frame."""
+        return self.goals_of_group(
+            frame if self.group is None else int(self.group[frame])
+        )
+
+    def goals_of_group(self, frame: int) -> IntArray:
+        """Rows of the goals of what ``frame`` counts: frames, or groups of them."""
         low, high = np.searchsorted(self.frame, [frame, frame + 1])
         return np.arange(low, high)
 
@@ -98,6 +113,17 @@ class Survey:
         """Approach of one goal from its pre-grasp at whatever turns, shape (n, dof)."""
         way = self.way_of(goal)
         return np.asarray(way + TURN_RAD * np.round((q - way[0]) / TURN_RAD))
+
+    def roll_of(self, frame: int, goal: int) -> float:
+        """By how much the tool is turned at a goal, against its frame [rad]."""
+        if self.roll is None or self.frame_roll is None:
+            return 0.0
+        turn = float(self.roll[goal] - self.frame_roll[frame])
+        return turn - TURN_RAD * round(turn / TURN_RAD)
+
+    def by_frame(self, values: Any) -> Any:
+        """Spread values of what ``frame`` counts over the frames."""
+        return values if self.group is None else values[self.group]
 
     def goals_near(
         self, rows: IntArray, q: FloatArray, windings: Windings
@@ -239,7 +265,7 @@ class SurveyContext:
 
     loaded: LoadedCell
     with_bin: bool
-    grids: tuple[FrameGrid, ...]
+    grids: tuple[FrameGrid | FrameList, ...]
     approach_m: float
 
     def blocks(self) -> list[tuple[int, slice]]:
@@ -251,11 +277,13 @@ class SurveyContext:
         ]
 
 
-def survey_in_stages(context: SurveyContext, stages: Stages) -> Survey:
+def survey_in_stages(
+    context: SurveyContext, stages: Stages, phase: str = "survey"
+) -> Survey:
     """Survey all frames; the result does not depend on the number of workers."""
     frames = sum(grid.size for grid in context.grids)
     payloads = stages.run(
-        "survey",
+        phase,
         Job(function=survey_unit, prepare=prepare_survey, context=context),
         context.blocks(),
         most=max(1, math.ceil(frames / (4 * FRAMES_PER_UNIT))),
@@ -275,4 +303,8 @@ def survey_unit(
     context, scene = state
     T = context.grids[block[0]].transforms_at(block[1])
     survey = survey_frames(scene, T, context.approach_m)
-    return {f.name: getattr(survey, f.name) for f in dataclasses.fields(survey)}
+    return {
+        f.name: value
+        for f in dataclasses.fields(survey)
+        if (value := getattr(survey, f.name)) is not None
+    }

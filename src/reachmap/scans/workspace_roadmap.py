@@ -189,11 +189,12 @@ def component_of_frames(survey: Survey, connection: Connection) -> IntArray:
     That of its goal with the shortest path, or of any goal where none is connected;
     -1 without goals.
     """
-    frames = len(survey.status)
+    groups = max(len(survey.status), int(survey.frame.max(initial=-1)) + 1)
     paths = connection.roadmap.shortest_paths()
     length = paths.length_rad[connection.roadmap.shortest_to_goals(paths)]
-    best = _best_goal(survey.frame, length, frames)
-    return _component_of_frames(survey.frame, connection, best, frames)
+    best = _best_goal(survey.frame, length, groups)
+    of_groups = _component_of_frames(survey.frame, connection, best, groups)
+    return np.asarray(survey.by_frame(of_groups))
 
 
 def path_to_frame(

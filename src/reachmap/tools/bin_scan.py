@@ -14,11 +14,8 @@ from reachmap.core.scene import Scene
 from reachmap.maps import BinMap, Status, read_placement, read_workspace_map
 from reachmap.runtime.options import IN_PROCESS, RunOptions
 from reachmap.runtime.run import run_scan
-from reachmap.scans.bin_scan import (
-    bin_work,
-    grasp_grid,
-    plan_grasps,
-)
+from reachmap.scans.bin_roadmap import grasp_grid, roadmap_of
+from reachmap.scans.bin_scan import bin_work, plan_grasps
 from reachmap.scans.document import checking_settings, scan_document
 from reachmap.scans.ik_survey import survey_frames
 from reachmap.tools.options import cell_of_artefact, warn_of_nothing, with_seed
@@ -146,7 +143,7 @@ def estimate_bin_scan(
     survey = survey_frames(
         scene, grid.transforms_at(rows), loaded.cell.bin_scan.approach_distance_m
     )
-    plan_grasps(scene, survey, range(len(rows)), np.ones(len(rows), bool))
+    plan_grasps(scene, roadmap_of(scene, survey), range(len(rows)))
     seconds = (time.perf_counter() - begin) / len(rows) * grid.size
     return {
         "cell": loaded.cell.name,
@@ -162,6 +159,8 @@ def _settings(scene: Scene) -> dict[str, Any]:
         **checking_settings(scene),
         "planner": cell.planner.model_dump(mode="json"),
         "roadmap": cell.roadmap.model_dump(mode="json"),
+        "tool": cell.tool.model_dump(mode="json"),
+        "attempts": cell.bin_scan.attempts,
         "repeats": cell.bin_scan.repeats,
         "approach_distance_m": cell.bin_scan.approach_distance_m,
     }

@@ -28,6 +28,7 @@ from reachmap.cell.model.scans import (
     PlacementSpec,
     WorkspaceScanSpec,
 )
+from reachmap.cell.model.tool import ToolSpec
 from reachmap.geometry import (
     inverse_transform,
     transform_from_parts,
@@ -50,6 +51,7 @@ __all__ = [
     "RobotSpec",
     "ScanConfiguration",
     "TcpSpec",
+    "ToolSpec",
     "WorkspaceScanSpec",
 ]
 
@@ -116,6 +118,7 @@ class Cell(Record):
     )
     resources: Resources = Field(Resources(), description="Where files are looked up.")
     robot: RobotSpec = Field(description="The arm.")
+    tool: ToolSpec = Field(ToolSpec(), description="How the tool may be turned.")
     camera: CameraSpec | None = Field(
         None, description="The 3D camera, if there is one."
     )

@@ -62,6 +62,25 @@ class RoadmapSpec(Record):
         12, description="Straight motions tried to a component before planning."
     )
 
+    route_goals: Few = Field(
+        24, description="Goals, spread over what is reached, of the network of routes."
+    )
+    route_plans: int = Field(
+        36, ge=0, le=1000, description="Plans that add routes to the network."
+    )
+    route_rounds: int = Field(
+        2, ge=0, le=20, description="Times its routes are joined and shortened."
+    )
+    ways: Few = Field(3, description="Ways to a goal of which the shortest is kept.")
+    way_tries: Few = Field(
+        100, description="Motions tried from the network to the goals of a frame."
+    )
+    least_gain: Positive = Field(
+        0.01,
+        lt=1,
+        description="A path is shortened until 15 tries gain less than this share.",
+    )
+
     @model_validator(mode="after")
     def _planners_differ(self) -> RoadmapSpec:
         if len(set(self.planners)) < len(self.planners):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
@@ -103,6 +103,11 @@ class BinScanSpec(Record):
     )
     repeats: int = Field(
         5, ge=1, le=255, description="Planning attempts to each test grasp."
+    )
+    attempts: Literal["roadmap", "planner"] = Field(
+        "roadmap",
+        description="roadmap: paths branch off a shared network of routes; planner: "
+        "the planner searches for each from scratch, as in the paper.",
     )
     approach_distance_m: Height = Field(
         0.0, description="Straight approach before the grasp [m]; 0 plans to the pose."

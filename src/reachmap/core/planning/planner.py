@@ -57,6 +57,20 @@ class PlanResult:
     unverified: int
     start: int = 0
 
+    @classmethod
+    def without_search(cls, path: FloatArray, goal: int = 0) -> PlanResult:
+        """A path that was known before."""
+        return cls(
+            path=path,
+            goal=goal,
+            checks=0,
+            planning_time_s=0.0,
+            planning_cpu_time_s=0.0,
+            simplification_time_s=0.0,
+            hit_time_limit=False,
+            unverified=0,
+        )
+
 
 class Planner:
     """A planner of the cell's kind, made anew for each attempt.

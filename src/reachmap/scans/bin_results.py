@@ -1,0 +1,239 @@
+"""Results of a bin scan, grasp by grasp, and the map they make."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from reachmap._typing import CodeArray, FloatArray, IntArray
+from reachmap.cell.model.cell import Cell
+from reachmap.cell.model.tool import LISTED
+from reachmap.core.planning.timing import path_length_rad
+from reachmap.maps import BinMap, PathStore, RunInfo, Stamp, Status
+from reachmap.maps.parts import ApproachTimes, BestPaths, Components, Effort
+from reachmap.maps.records import freeze
+from reachmap.sampling.frames import bin_test_frames
+from reachmap.scans.document import provenance_from_document
+from reachmap.scans.measured import MEASURED, SECONDS_PER_CHECK
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GraspResults:
+    """What became of test grasps and their attempts.
+
+    Attributes
+    ----------
+    status, n_ik, n_ik_free, connected : uint8 array, shape (grasps,)
+    blocking_pair : int array, shape (grasps,)
+    path_found, hit_time_limit : uint8 array, shape (grasps, repeats)
+    checks : int array, shape (grasps, repeats)
+        State checks of the search.
+    measured : array, shape (grasps, repeats, 9)
+        In the order of :data:`~reachmap.scans.measured.MEASURED`.
+    own : array, shape (grasps, 9)
+        The same of the roadmap's own path, NaN where it is not needed.
+    component : int array, shape (grasps,)
+    winning_roll : array, shape (grasps,)
+        Of the best path, relative to the test grasp [rad].
+    configuration : array, shape (points, dof)
+        Way-points of all paths, one path after another.
+    row_size, planned_size : int array, shape (paths,)
+    place : int array, shape (paths, 2)
+        Grasp and repeat of each path; repeat -1 for the roadmap's own.
+    """
+
+    status: CodeArray
+    n_ik: CodeArray
+    n_ik_free: CodeArray
+    connected: CodeArray
+    blocking_pair: IntArray
+    path_found: CodeArray
+    hit_time_limit: CodeArray
+    checks: IntArray
+    measured: FloatArray
+    own: FloatArray
+    component: IntArray
+    winning_roll: FloatArray
+    configuration: FloatArray
+    row_size: IntArray
+    planned_size: IntArray
+    place: IntArray
+
+    def __post_init__(self) -> None:
+        freeze(self)
+
+    @classmethod
+    def blank(cls, grasps: int, repeats: int, dof: int, status: Status) -> GraspResults:
+        """Results of grasps that nothing is known of."""
+        return cls(
+            status=np.full(grasps, status, np.uint8),
+            n_ik=np.zeros(grasps, np.uint8),
+            n_ik_free=np.zeros(grasps, np.uint8),
+            connected=np.zeros(grasps, np.uint8),
+            blocking_pair=np.full(grasps, -1, np.int64),
+            path_found=np.zeros((grasps, repeats), np.uint8),
+            hit_time_limit=np.zeros((grasps, repeats), np.uint8),
+            checks=np.zeros((grasps, repeats), np.int64),
+            measured=np.full((grasps, repeats, len(MEASURED)), np.nan),
+            own=np.full((grasps, len(MEASURED)), np.nan),
+            component=np.full(grasps, -1, np.int64),
+            winning_roll=np.full(grasps, np.nan),
+            configuration=np.zeros((0, dof)),
+            row_size=np.zeros(0, np.int64),
+            planned_size=np.zeros(0, np.int64),
+            place=np.zeros((0, 2), np.int64),
+        )
+
+    @classmethod
+    def join(cls, parts: Sequence[GraspResults]) -> GraspResults:
+        """Results of consecutive grasps, put together."""
+        joined = {
+            name: np.concatenate([getattr(part, name) for part in parts])
+            for name in cls.__slots__
+            if name != "place"
+        }
+        begin = np.cumsum([0, *(len(part.status) for part in parts[:-1])])
+        place = [
+            part.place + np.array([first, 0])
+            for part, first in zip(parts, begin, strict=True)
+        ]
+        return cls(**joined, place=np.concatenate(place))
+
+
+def assemble_bin_map(
+    document: Mapping[str, Any],
+    results: GraspResults,
+    *,
+    run: RunInfo,
+    components: Components | None,
+) -> BinMap:
+    """Make the map of a scan.
+
+    Parameters
+    ----------
+    document : mapping
+        See :func:`reachmap.scans.document.scan_document`.
+    results : GraspResults
+        Of all test grasps.
+    run : RunInfo
+    components : Components or None
+        Evidence of the roadmap; None where the unit that holds it is missing.
+    """
+    cell = Cell.model_validate_json(document["provenance"]["cell_resolved_json"])
+    T_base_bin = cell.T_base_bin()
+    grid = bin_test_frames(cell, T_base_bin)
+    shape = grid.frames.shape
+
+    def shaped(values: Any) -> Any:
+        return values.reshape(*shape, *values.shape[1:])
+
+    found = (results.status == Status.PATH_FOUND).reshape(shape)
+    known = (results.status != Status.NOT_ATTEMPTED).reshape(shape)
+    with np.errstate(invalid="ignore"):
+        percent = 100.0 * found.sum(-1) / known.sum(-1)
+    quaternion = np.broadcast_to(grid.frames.quaternion_wxyz, (*shape, 4))
+    best = _best_paths(results)
+    goal = np.full((len(results.status), results.configuration.shape[1]), np.nan)
+    there = best.row >= 0
+    goal[there] = results.configuration[
+        np.cumsum(results.row_size)[best.row[there]] - 1
+    ]
+    return BinMap(
+        T_world_base=cell.robot.base_pose.matrix(),
+        layer=grid.layer,
+        y=grid.y,
+        x=grid.x,
+        bin_pose=T_base_bin,
+        bin_inner=np.array(cell.bin.inner),
+        position=grid.frames.points,
+        quaternion_wxyz=quaternion.copy(),
+        approach_axis=cell.robot.tcp.approach_axis,
+        approach_distance=cell.bin_scan.approach_distance_m,
+        status=shaped(results.status),
+        blocking_pair=shaped(results.blocking_pair),
+        n_ik=shaped(results.n_ik),
+        n_ik_free=shaped(results.n_ik_free),
+        connected=shaped(results.connected),
+        path_found=shaped(results.path_found),
+        hit_time_limit=shaped(results.hit_time_limit),
+        **_of_attempts(results, shaped),
+        goal_configuration=shaped(_ends(results, best)),
+        component=None if components is None else shaped(results.component),
+        components=components,
+        best=BestPaths(
+            **{name: shaped(getattr(best, name)) for name in BestPaths.__slots__}
+        ),
+        winning_roll=(
+            None if cell.tool.roll == LISTED else shaped(results.winning_roll)
+        ),
+        path_reachability=percent,
+        scan_configuration=np.array(document["scan_configuration"], float),
+        joint_names=tuple(document["joint_names"]),
+        body_pairs=tuple(document["body_pairs"]),
+        paths=_path_store(results, shape),
+        stamp=Stamp(**document["stamp"]),
+        provenance=provenance_from_document(document),
+        run=run,
+    )
+
+
+def _of_attempts(results: GraspResults, shaped: Callable[[Any], Any]) -> dict[str, Any]:
+    """What the map holds of every attempt."""
+    measured = {
+        name: shaped(results.measured[..., k]) for k, name in enumerate(MEASURED)
+    }
+    return {
+        "times": ApproachTimes(
+            approach=measured.pop("approach_time"),
+            retreat=measured.pop("retreat_time"),
+        ),
+        "effort": Effort(
+            checks=shaped(results.checks), seconds_per_check=SECONDS_PER_CHECK
+        ),
+        **measured,
+    }
+
+
+def _best_paths(results: GraspResults) -> BestPaths:
+    """The shortest path to each test grasp, of whatever origin; the first of equals."""
+    grasps = len(results.status)
+    row = np.full(grasps, -1, np.int64)
+    execution = np.full(grasps, np.nan)
+    length = np.full(grasps, np.nan)
+    effort = np.zeros(grasps, np.int64)
+    ends = np.cumsum(results.row_size)
+    for k, (grasp, repeat) in enumerate(results.place.tolist()):
+        path = results.configuration[ends[k] - results.row_size[k] : ends[k]]
+        length_rad = path_length_rad(path)
+        if length_rad >= length[grasp]:
+            continue
+        row[grasp], length[grasp] = k, length_rad
+        own = repeat < 0
+        numbers = results.own[grasp] if own else results.measured[grasp, repeat]
+        execution[grasp] = numbers[MEASURED.index("execution_time")]
+        effort[grasp] = 0 if own else results.checks[grasp, repeat]
+    return BestPaths(
+        row=row, path_length=length, execution_time=execution, effort_checks=effort
+    )
+
+
+def _ends(results: GraspResults, best: BestPaths) -> FloatArray:
+    """Where the best path to each grasp ends, shape (grasps, dof); NaN without one."""
+    ends = np.full((len(best.row), results.configuration.shape[1]), np.nan)
+    there = best.row >= 0
+    last = np.cumsum(results.row_size) - 1
+    ends[there] = results.configuration[last[best.row[there]]]
+    return ends
+
+
+def _path_store(results: GraspResults, shape: tuple[int, ...]) -> PathStore:
+    where = np.stack(np.unravel_index(results.place[:, 0], shape), axis=1)
+    return PathStore(
+        configuration=results.configuration,
+        row_size=results.row_size,
+        planned_size=results.planned_size,
+        index=np.concatenate([where, results.place[:, 1:]], axis=1).astype(np.int64),
+    )

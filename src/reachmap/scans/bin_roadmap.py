@@ -1,0 +1,140 @@
+"""What is known of all test grasps before attempts are made: goals, roadmap, routes."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from reachmap._typing import FloatArray, IntArray
+from reachmap.cell.model.tool import LISTED
+from reachmap.core.planning.roadmap import ShortestPaths
+from reachmap.core.planning.routes import RouteNetwork
+from reachmap.core.scene import Scene
+from reachmap.maps.parts import Components
+from reachmap.runtime.job import Stages
+from reachmap.runtime.progress import Progress
+from reachmap.sampling.frames import FrameGrid, FrameList, bin_test_frames
+from reachmap.scans.ik_survey import Survey, SurveyContext, survey_in_stages
+from reachmap.scans.rolls import RollGroups
+from reachmap.scans.routes import Routes
+from reachmap.scans.workspace_roadmap import (
+    component_of_frames,
+    components_of,
+    connect_survey,
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class BinRoadmap:
+    """Goals of all test grasps, and how they are connected.
+
+    Attributes
+    ----------
+    survey : Survey
+    component : int array, shape (grasps,)
+        Component of the roadmap, -1 without goals.
+    components : Components
+        Evidence of the roadmap.
+    routes : Routes
+    """
+
+    survey: Survey
+    component: IntArray
+    components: Components
+    routes: Routes
+
+
+def grasp_grid(scene: Scene) -> FrameGrid:
+    """Test grasps of a scan, in robot_base."""
+    return bin_test_frames(scene.loaded.cell, scene.T_base_bin).frames
+
+
+def connected_grasps(scene: Scene, stages: Stages) -> BinRoadmap:
+    """Survey the test grasps and connect them."""
+    tool = scene.loaded.cell.tool
+    survey = _survey(scene, stages, "survey", grasp_grid(scene))
+    if tool.roll == LISTED:
+        return _connected(scene, stages, "connect", survey)
+    axis = scene.loaded.cell.robot.tcp.approach_axis
+    groups = RollGroups.of(grasp_grid(scene), axis, tool)
+    number = iter(range(1, len(groups.turns) + 2))
+
+    def solve(T: FloatArray) -> Survey:
+        return _survey(scene, stages, f"rolls_{next(number)}", FrameList(T=T))
+
+    survey = groups.share_goals(survey)
+    without = np.setdiff1d(groups.group, survey.frame)
+    survey = groups.add_rolls(survey, without, axis, solve, until_found=True)
+    known = _connected(scene, stages, "connect", survey)
+    missed = np.setdiff1d(
+        survey.frame, survey.frame[np.isfinite(known.routes.length_rad)]
+    )
+    # One roll had a goal, but no path: perhaps another one has.
+    more = groups.add_rolls(survey, missed, axis, solve, until_found=False)
+    if len(more.frame) == len(survey.frame):
+        return known
+    return _connected(scene, stages, "connect_again", more)
+
+
+def _survey(
+    scene: Scene, stages: Stages, phase: str, frames: FrameGrid | FrameList
+) -> Survey:
+    context = SurveyContext(
+        loaded=scene.loaded,
+        with_bin=True,
+        grids=(frames,),
+        approach_m=scene.loaded.cell.bin_scan.approach_distance_m,
+    )
+    return survey_in_stages(context, stages, phase)
+
+
+def _connected(scene: Scene, stages: Stages, phase: str, survey: Survey) -> BinRoadmap:
+    payload = stages.once(phase, partial(_connection, scene, survey))
+    return _roadmap_from_payload(survey, payload)
+
+
+def roadmap_of(scene: Scene, survey: Survey) -> BinRoadmap:
+    """Connect the goals of a survey here and now."""
+    silent = Progress("", quiet=True)
+    return _roadmap_from_payload(survey, _connection(scene, survey, silent))
+
+
+def _connection(scene: Scene, survey: Survey, progress: Progress) -> dict[str, Any]:
+    cell = scene.loaded.cell
+    connection = connect_survey(scene, survey, seed=cell.seed, progress=progress)
+    routes = Routes.of(
+        scene, survey, connection, with_network=cell.bin_scan.attempts == "roadmap"
+    )
+    network = routes.network
+    return {
+        "component": component_of_frames(survey, connection),
+        "components": dataclasses.asdict(components_of(connection)),
+        "paths": dataclasses.asdict(routes.paths),
+        "node": routes.node,
+        "network": None if network is None else dataclasses.asdict(network),
+    }
+
+
+def _roadmap_from_payload(survey: Survey, payload: Mapping[str, Any]) -> BinRoadmap:
+    """What a stage of the scan has left in the store."""
+    network = payload["network"]
+    return BinRoadmap(
+        survey=survey,
+        component=payload["component"],
+        components=components_from_payload(payload["components"]),
+        routes=Routes(
+            paths=ShortestPaths(**payload["paths"]),
+            node=payload["node"],
+            network=None if network is None else RouteNetwork(**network),
+        ),
+    )
+
+
+def components_from_payload(values: Mapping[str, Any]) -> Components:
+    """Evidence of the roadmap; lists of names come back from the store as lists."""
+    return Components(**{**values, "methods": tuple(values["methods"])})

@@ -1,0 +1,178 @@
+"""Attempts at test grasps that branch off a shared network of routes."""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from reachmap._typing import FloatArray, IntArray
+from reachmap.core.kinematics.windings import Windings
+from reachmap.core.planning.connection import Connection, portfolio
+from reachmap.core.planning.planner import Planner, PlanResult
+from reachmap.core.planning.roadmap import ShortestPaths
+from reachmap.core.planning.routes import (
+    RouteNetwork,
+    build_network,
+    shorten_until,
+    spread_over,
+)
+from reachmap.core.planning.timing import path_length_rad
+from reachmap.core.scene import Scene
+from reachmap.scans.ik_survey import Survey
+from reachmap.scans.measured import attempt_seed
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Routes:
+    """How test grasps are reached over the roadmap; what a worker is sent of it.
+
+    Attributes
+    ----------
+    paths : ShortestPaths
+        Of the roadmap.
+    node : int array, shape (goals,)
+        Node of the roadmap at which each goal is nearest by path.
+    network : RouteNetwork or None
+        None where nothing is reached, or attempts are made by the planner.
+    """
+
+    paths: ShortestPaths
+    node: IntArray
+    network: RouteNetwork | None
+
+    @classmethod
+    def of(
+        cls, scene: Scene, survey: Survey, connection: Connection, *, with_network: bool
+    ) -> Routes:
+        """Routes of a connected survey.
+
+        Parameters
+        ----------
+        scene : Scene
+        survey : Survey
+        connection : Connection
+            Of that survey.
+        with_network : bool
+            Whether paths are to branch off a network, which takes time to build.
+        """
+        paths = connection.roadmap.shortest_paths()
+        node = connection.roadmap.shortest_to_goals(paths)
+        routes = cls(paths=paths, node=node, network=None)
+        reached = np.flatnonzero(np.isfinite(paths.length_rad[node]))
+        if not with_network or not len(reached):
+            return routes
+        cell = scene.loaded.cell
+        spec, windings = cell.roadmap, Windings(scene.robot)
+        rows = reached[
+            spread_over(paths.configurations[node[reached]], spec.route_goals)
+        ]
+        network = build_network(
+            [paths.path_to(int(node[row])) for row in rows],
+            [
+                survey.goals_near(
+                    survey.goals_of_group(int(survey.frame[row])),
+                    scene.scan_configuration,
+                    windings,
+                )[0]
+                for row in rows
+            ],
+            [Planner(scene.motions, one) for one in portfolio(spec)],
+            spec,
+            cell.seed,
+        )
+        return cls(paths=paths, node=node, network=network)
+
+    @property
+    def length_rad(self) -> FloatArray:
+        """Length of the roadmap's path to each goal, infinite without one."""
+        return self.paths.length_rad[self.node]
+
+    def over_roadmap(self, survey: Survey, grasp: int) -> tuple[FloatArray, int] | None:
+        """The roadmap's own path to a test grasp, and the goal that it ends at.
+
+        None where the grasp is not connected.
+        """
+        rows = survey.goals_of(grasp)
+        length = self.length_rad[rows]
+        if not np.isfinite(length).any():
+            return None
+        goal = int(rows[np.argmin(length)])
+        return self.paths.path_to(int(self.node[goal])), goal
+
+
+class RouteAttempts:
+    """Makes attempts at test grasps over the network.
+
+    Parameters
+    ----------
+    scene : Scene
+    survey : Survey
+    routes : Routes
+    """
+
+    def __init__(self, scene: Scene, survey: Survey, routes: Routes) -> None:
+        self._scene, self._survey, self._routes = scene, survey, routes
+        self._windings = Windings(scene.robot)
+
+    def at(self, grasp: int, repeats: int) -> list[tuple[PlanResult, int]]:
+        """Attempts at one test grasp, each with the goal it ends at.
+
+        The ways that branch off the network are the same for all of them; each
+        shortens them with a seed of its own. Empty where the grasp is not connected.
+        """
+        own = self._routes.over_roadmap(self._survey, grasp)
+        if own is None:
+            return []
+        scene, checker = self._scene, self._scene.checker
+        rows = self._survey.goals_of(grasp)
+        goals, goal = self._survey.goals_near(
+            rows, scene.scan_configuration, self._windings
+        )
+        wall, cpu, checks = time.perf_counter(), time.thread_time(), checker.checks
+        network, spec = self._routes.network, scene.loaded.cell.roadmap
+        ways = network.ways_to(goals, scene.motions, spec) if network else []
+        wall, cpu = time.perf_counter() - wall, time.thread_time() - cpu
+        checks = checker.checks - checks
+        attempts: list[tuple[PlanResult, int]] = []
+        for repeat in range(repeats):
+            begin = time.thread_time()
+            path, end = own
+            # What is straight needs no shortening: every attempt takes it.
+            if repeat and ways and len(ways[0]) == 2:
+                path, end = ways[0], attempts[0][1]
+            else:
+                path = self._shortened(ways or [path], grasp, repeat)
+                if ways:
+                    end = int(goal[np.argmin(np.abs(goals - path[-1]).max(axis=1))])
+            result = dataclasses.replace(
+                PlanResult.without_search(path, end),
+                checks=checks,
+                planning_time_s=wall,
+                planning_cpu_time_s=cpu,
+                simplification_time_s=time.thread_time() - begin,
+            )
+            attempts.append((result, end))
+        return attempts
+
+    def own(self, grasp: int) -> tuple[FloatArray, int] | None:
+        """The roadmap's own path to a test grasp, shortened, and its goal."""
+        own = self._routes.over_roadmap(self._survey, grasp)
+        if own is None:
+            return None
+        return self._shortened([own[0]], grasp, -1), own[1]
+
+    def _shortened(
+        self, ways: Sequence[FloatArray], grasp: int, repeat: int
+    ) -> FloatArray:
+        """The shortest of some ways, all of them shortened."""
+        scene = self._scene
+        cell, motions = scene.loaded.cell, scene.motions
+        rng = np.random.default_rng(attempt_seed(cell.seed, grasp, repeat + 1))
+        short = [
+            shorten_until(way, motions, rng, cell.roadmap.least_gain) for way in ways
+        ]
+        return min(short, key=path_length_rad)
