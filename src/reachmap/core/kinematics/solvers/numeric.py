@@ -20,9 +20,9 @@ from reachmap.core.kinematics.solutions import (
 )
 from reachmap.core.kinematics.solvers.arm import Arm, Way
 
-# Rows of the table of starts that are looked at, per start that is asked for: a third
+# Rows of the table of starts that are looked at, per start that is asked for: a fifth
 # of them shares a cell with a nearer one.
-_ROWS_PER_START = 1.5
+_ROWS_PER_START = 1.25
 
 # The first steps are made in single precision, for all starts; then those that have
 # come together are one [rad or m], unless they are further from the pose.
