@@ -43,7 +43,10 @@ def test_a_playback_takes_the_execution_time(playbacks: list[Playback]) -> None:
     assert playbacks
     for row, playback in enumerate(playbacks):
         place = tuple(record.paths.index[row])
-        assert playback.time_s[-1] == pytest.approx(record.execution_time[place])
+        at_grasp = record.execution_time[place]
+        out = at_grasp + record.times.retreat[place]
+        assert playback.time_s[playback.grasp] == pytest.approx(at_grasp)
+        assert playback.time_s[-1] == pytest.approx(out)
         assert (np.diff(playback.time_s) > 0).all()
         assert len(playback.time_s) == len(playback.configuration)
 

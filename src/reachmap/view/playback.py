@@ -30,8 +30,8 @@ class Playback:
     configuration : array, shape (k, dof)
         [rad].
     time_s : array, shape (k,)
-        When each is taken, from 0; the last is the execution time: the planned part,
-        the straight approach, and back by the same way.
+        When each is taken, from 0; that of the grasp is the execution time, the
+        last is later by the retreat, which goes back by the same way.
     grasp : int
         Index of the configuration at the grasp.
     test_grasp : tuple of int
