@@ -13,8 +13,14 @@ from reachmap.cell.model.cell import Cell
 from reachmap.cell.model.tool import LISTED
 from reachmap.core.planning.timing import path_length_rad
 from reachmap.maps import BinMap, PathStore, RunInfo, Stamp, Status
-from reachmap.maps.parts import ApproachTimes, BestPaths, Components, Effort
-from reachmap.maps.records import freeze
+from reachmap.maps.parts import (
+    ApproachTimes,
+    BestPaths,
+    Components,
+    Effort,
+    Margins,
+)
+from reachmap.maps.records import NO_PAIR, freeze
 from reachmap.sampling.frames import bin_test_frames
 from reachmap.scans.document import provenance_from_document
 from reachmap.scans.measured import MEASURED, SECONDS_PER_CHECK
@@ -38,6 +44,9 @@ class GraspResults:
     component : int array, shape (grasps,)
     winning_roll : array, shape (grasps,)
         Of the best path, relative to the test grasp [rad].
+    margins : array, shape (grasps, 4)
+        Of the best path: clearance [m], the pair that comes closest (-1: none), joint
+        margin [rad], smallest singular value; NaN without a path.
     configuration : array, shape (points, dof)
         Way-points of all paths, one path after another.
     row_size, planned_size : int array, shape (paths,)
@@ -57,6 +66,7 @@ class GraspResults:
     own: FloatArray
     component: IntArray
     winning_roll: FloatArray
+    margins: FloatArray
     configuration: FloatArray
     row_size: IntArray
     planned_size: IntArray
@@ -81,6 +91,7 @@ class GraspResults:
             own=np.full((grasps, len(MEASURED)), np.nan),
             component=np.full(grasps, -1, np.int64),
             winning_roll=np.full(grasps, np.nan),
+            margins=np.full((grasps, 4), np.nan),
             configuration=np.zeros((0, dof)),
             row_size=np.zeros(0, np.int64),
             planned_size=np.zeros(0, np.int64),
@@ -169,6 +180,7 @@ def assemble_bin_map(
         winning_roll=(
             None if cell.tool.roll == LISTED else shaped(results.winning_roll)
         ),
+        margins=_margins(shaped(results.margins)),
         path_reachability=percent,
         scan_configuration=np.array(document["scan_configuration"], float),
         joint_names=tuple(document["joint_names"]),
@@ -195,6 +207,17 @@ def _of_attempts(results: GraspResults, shaped: Callable[[Any], Any]) -> dict[st
         ),
         **measured,
     }
+
+
+def _margins(values: FloatArray) -> Margins:
+    """Margins from their columns, shape (..., 4)."""
+    clearance, pair, joint_margin, singular_value = np.moveaxis(values, -1, 0)
+    return Margins(
+        clearance=clearance,
+        clearance_pair=np.nan_to_num(pair, nan=NO_PAIR).astype(np.int64),
+        joint_margin=joint_margin,
+        smallest_singular_value=singular_value,
+    )
 
 
 def _best_paths(results: GraspResults) -> BestPaths:

@@ -27,6 +27,7 @@ from reachmap.scans.bin_roadmap import (
 )
 from reachmap.scans.document import journal_settings
 from reachmap.scans.ik_survey import Survey
+from reachmap.scans.margins import MarginMeter
 from reachmap.scans.measured import MEASURED, Meter, attempt_seed
 from reachmap.scans.routes import RouteAttempts
 
@@ -105,11 +106,11 @@ def plan_grasps(
         plans = [attempts.at(grasp, spec.repeats) for grasp in grasps]
     else:
         plans = plan_from_scratch(scene, survey, grasps)
-    results = []
+    results, margins = [], MarginMeter(scene)
     for grasp, made in zip(grasps, plans, strict=True):
         missed = all(plan.path is None for plan, _ in made)
         own = attempts.own(grasp) if missed else None
-        results.append(_results(scene, known, grasp, made, own))
+        results.append(_results(scene, known, grasp, made, own, margins))
     return results
 
 
@@ -143,6 +144,7 @@ def _results(
     grasp: int,
     plans: Sequence[tuple[PlanResult, int]],
     own: tuple[FloatArray, int] | None,
+    margins: MarginMeter,
 ) -> GraspResults:
     survey, repeats = known.survey, scene.loaded.cell.bin_scan.repeats
     measured = np.full((1, repeats, len(MEASURED)), np.nan)
@@ -180,6 +182,9 @@ def _results(
         component=known.component[[grasp]],
         winning_roll=np.array(
             [np.nan if best is None else survey.roll_of(grasp, best[3])]
+        ),
+        margins=np.array(
+            [[np.nan] * 4 if best is None else margins.of_path(best[0], best[1])]
         ),
         configuration=np.vstack(
             [np.zeros((0, scene.robot.dof)), *(entry[0] for entry in found)]

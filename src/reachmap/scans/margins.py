@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -15,8 +14,7 @@ if TYPE_CHECKING:
     from reachmap.core.scene import Scene
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PathMargins:
+class PathMargins(NamedTuple):
     """Margins of one path to a grasp.
 
     Attributes
@@ -62,7 +60,7 @@ class MarginMeter:
             Way-points of its planned part; the approach begins at the last of them.
         """
         clearance, pair = self._clearance.of_path(path)
-        approach = path[planned - 1 :]
+        approach = path[max(planned - 1, 0) :]
         return PathMargins(
             clearance_m=clearance,
             clearance_pair=pair,
