@@ -147,10 +147,12 @@ def _cause_lines(causes: Causes) -> list[str]:
 def _bin_lines(summary: BinSummary) -> list[str]:
     s = summary.saturation
     rows = [["attempts", "reached", "of", "%", "95 % interval"]]
+    first = 0 if summary.independent else len(s.attempts) - 1
     rows += [
         [str(k), str(n), str(s.total), f"{share:.2f}", f"{low:.2f} to {high:.2f}"]
         for k, n, share, low, high in zip(
-            s.attempts, s.hits, s.share, s.low, s.high, strict=True
+            *(v[first:] for v in (s.attempts, s.hits, s.share, s.low, s.high)),
+            strict=True,
         )
     ]
     return [

@@ -12,6 +12,7 @@ import numpy as np
 from reachmap._typing import FloatArray
 from reachmap.errors import SettingsError
 from reachmap.maps.records import BinMap, BinPlacement, WorkspaceMap
+from reachmap.maps.summary.statistics import are_independent
 from reachmap.plots.approach import draw_approach
 from reachmap.plots.bin_map import (
     draw_clearance,
@@ -183,8 +184,7 @@ def bin_album(
             values = percent_after(bin_map, repeats)[layer]
             text = level_table(bin_map.x, bin_map.y, values)
             items.append(Table(name=f"bin_reachability{end}", text=text))
-    # One attempt has no saturation.
-    if bin_map.path_found.shape[-1] > 1:
+    if are_independent(bin_map):
         items.append(
             Picture(
                 name="bin_saturation",

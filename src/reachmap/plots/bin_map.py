@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from reachmap._typing import FloatArray
 from reachmap.maps.records import BinMap
 from reachmap.maps.summary.directions import reachability_of_directions
+from reachmap.maps.summary.statistics import are_independent
 from reachmap.plots.parts.bin_view import (
     BinView,
     attempted,
@@ -58,7 +59,7 @@ def draw_reachability(
     repeats = bin_map.path_found.shape[-1]
     panels = [
         (_share_text(bin_map, layer, n), percent_after(bin_map, n)[layer])
-        for n in ([1] if repeats == 1 else [1, repeats])
+        for n in ([1, repeats] if are_independent(bin_map) else [repeats])
     ]
     return _draw_row(
         bin_map, layer, panels, "Path reachability in the bin", percent_map

@@ -6,7 +6,12 @@ import numpy as np
 
 from reachmap.maps.summary.directions import reached_shares
 from reachmap.maps.summary.placement import summarise_placement
-from reachmap.maps.summary.statistics import best_level, level_means, saturation_of
+from reachmap.maps.summary.statistics import (
+    are_independent,
+    best_level,
+    level_means,
+    saturation_of,
+)
 from reachmap.report.blocks import Tile
 from reachmap.report.folder import RunFolder
 from reachmap.report.numbers import count, interval, number, percent, signed
@@ -89,7 +94,9 @@ def _share(run: RunFolder) -> Tile:
         f"(95 % interval {interval(float(found.low[-1]), float(found.high[-1]))}); "
         f"{percent(shares.directions)} of the directions with at least one roll, "
         f"{percent(shares.points)} of the points from at least one direction.",
-        f"After one attempt: {percent(float(found.share[0]))}." if attempts > 1 else "",
+        f"After one attempt: {percent(float(found.share[0]))}."
+        if are_independent(run.bin_map)
+        else "",
     )
 
 

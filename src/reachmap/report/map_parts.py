@@ -12,6 +12,7 @@ from reachmap.maps.summary.placement import (
     PlacementSummary,
     summarise_placement,
 )
+from reachmap.maps.summary.statistics import are_independent
 from reachmap.maps.summary.workspace import WorkspaceSummary, summarise_workspace
 from reachmap.plots.approach import draw_approach
 from reachmap.plots.bin_map import (
@@ -245,7 +246,7 @@ def _shares_paragraph(summary: BinSummary) -> Blocks:
 
 def _saturation(record: BinMap) -> Blocks:
     """Only attempts of a planner that were repeated saturate."""
-    if record.path_found.shape[-1] < 2:
+    if not are_independent(record):
         return None
     return drawn(
         draw_saturation(record),

@@ -15,6 +15,7 @@ from reachmap.maps.summary.directions import (
 )
 from reachmap.maps.summary.evidence import evidence_of
 from reachmap.maps.summary.reliability import reliability_of, term_reliability
+from reachmap.maps.summary.statistics import are_independent
 from tests.support.ranking_maps import make_bin_map
 from tests.support.synthetic_parts import synthetic_components
 
@@ -105,6 +106,16 @@ def test_the_terms_of_a_map_count_successes_alone() -> None:
     checks = np.where(record.path_found == 1, record.effort.checks, np.nan)
     again = reliability_of(checks.reshape(-1, checks.shape[-1]))
     assert shares["effort_checks"] == again
+    shared = dataclasses.replace(
+        record,
+        provenance=dataclasses.replace(
+            record.provenance, settings={"attempts": "roadmap"}
+        ),
+    )
+    assert "planning_cpu_time" in shares
+    assert "planning_cpu_time" not in term_reliability(shared)
+    assert are_independent(record)
+    assert not are_independent(shared)
     without = term_reliability(dataclasses.replace(record, effort=None))
     assert "effort_checks" not in without
 

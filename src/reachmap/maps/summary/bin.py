@@ -14,6 +14,7 @@ from reachmap.maps.summary.reliability import Reliability, term_reliability
 from reachmap.maps.summary.statistics import (
     Causes,
     Saturation,
+    are_independent,
     attempted,
     causes_of,
     saturation_of,
@@ -113,6 +114,8 @@ class BinSummary:
     repeats, layers, paths, time_limit_hits : int
         Attempts per test grasp, heights, stored paths, attempts that the limit on
         wall-clock time ended.
+    independent : bool
+        Whether the attempts are several searches of a planner, which saturate.
     saturation : Saturation
     causes : Causes
     measures : mapping of str to Spread
@@ -132,6 +135,7 @@ class BinSummary:
     layers: int
     paths: int
     time_limit_hits: int
+    independent: bool
     saturation: Saturation
     causes: Causes
     measures: dict[str, Spread]
@@ -150,6 +154,7 @@ def summarise_bin(record: BinMap) -> BinSummary:
         layers=len(record.layer),
         paths=len(record.paths.row_size),
         time_limit_hits=int(record.hit_time_limit.sum()),
+        independent=are_independent(record),
         saturation=saturation_of(record),
         causes=causes_of(record),
         measures=_measures(record),

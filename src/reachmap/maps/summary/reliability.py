@@ -87,14 +87,16 @@ def term_reliability(record: BinMap) -> dict[str, Reliability]:
     """Reliability of what J is made of, and of the measured planning time.
 
     Keys are ``path_length``, ``effort_checks`` (where the map counts them),
-    ``planning_cpu_time`` and ``execution_time``.
+    ``planning_cpu_time`` (where attempts are independent) and ``execution_time``.
     """
     found = record.path_found == 1
     measures = {"path_length": record.path_length}
     if record.effort is not None:
         checks = record.effort.checks.astype(float)
         measures["effort_checks"] = np.where(found, checks, np.nan)
-    measures["planning_cpu_time"] = record.planning_cpu_time
+    # Attempts that share their search share its time; that tells nothing of luck.
+    if record.provenance.settings.get("attempts", "planner") != "roadmap":
+        measures["planning_cpu_time"] = record.planning_cpu_time
     measures["execution_time"] = record.execution_time
     attempts = found.shape[-1]
     return {

@@ -73,6 +73,16 @@ def found_after(bin_map: BinMap, attempts: int) -> BoolArray:
     return np.asarray(bin_map.path_found[..., :attempts].any(axis=-1))
 
 
+def are_independent(bin_map: BinMap) -> bool:
+    """Whether each test grasp has several attempts of a planner.
+
+    Attempts that branch off the roadmap's routes share their search; more of them
+    reach no more, and have no saturation.
+    """
+    attempts = str(bin_map.provenance.settings.get("attempts", "planner"))
+    return bin_map.path_found.shape[-1] > 1 and attempts != "roadmap"
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Saturation:
     """Test grasps reached over the number of attempts, in percent.
