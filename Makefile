@@ -53,7 +53,9 @@ test-lowest: $(TOOLS)/uv ## Run the default suite with the oldest dependencies t
 	$(TOOLS)/uv venv -q --clear --python 3.11 build/lowest
 	$(TOOLS)/uv pip install -q --python build/lowest/bin/python -r build/lowest.txt
 	$(TOOLS)/uv pip install -q --python build/lowest/bin/python --no-deps --editable .
-	build/lowest/bin/python -m pytest -n $(JOBS)
+	@# Old versions may use what newer ones of other packages call deprecated.
+	build/lowest/bin/python -m pytest -n $(JOBS) -W ignore::DeprecationWarning \
+	    -W "ignore:numpy.ndarray size changed:RuntimeWarning"
 
 fuzz: $(VENV)/.dev ## Let a fuzzer at every reader of files, FUZZ_S seconds each
 	$(PIP) install --editable '.[fuzz]'
