@@ -172,7 +172,7 @@ def _packages_of(found: RobotSource, expansions: list[Expansion]) -> list[str]:
         *found.robot.visual_meshes,
     ]
     names = [
-        text.removeprefix(SCHEME).split("/")[0]
+        text.removeprefix(SCHEME).lstrip("/").split("/")[0]
         for text in references
         if text.startswith(SCHEME)
     ]
