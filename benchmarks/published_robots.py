@@ -30,14 +30,17 @@ from reachmap.errors import ReachmapError
 SETTINGS = (
     "workspace_scan.cubes.0.grid=[4,3]",
     "workspace_scan.cubes.1.grid=[4,3]",
-    "workspace_scan.orientations.azimuths=[1,4]",
-    "workspace_scan.orientations.rolls=1",
     "workspace_scan.repeats=1",
     "bin_scan.grid=[3,2]",
-    "bin_scan.orientations.azimuths=[1,4]",
-    "bin_scan.orientations.rolls=2",
     "bin_scan.repeats=1",
 )
+# For the cone of arms with six axes or more.
+ORIENTATIONS = tuple(
+    f"{scan}.orientations.{setting}"
+    for scan in ("workspace_scan", "bin_scan")
+    for setting in ("azimuths=[1,4]", "rolls=2")
+)
+FULL_AXES = 6
 GRASPS = {
     "format": "reachmap.grasps",
     "format_version": "1.0",
@@ -90,7 +93,6 @@ def solved(cell: Path, count: int) -> tuple[str, bool, int]:
 def chain(line: str, folder: Path, count: int, *, scans: bool) -> dict[str, object]:
     """Row of the table for one robot."""
     row: dict[str, object] = {"robot": line}
-    sets = [word for setting in SETTINGS for word in ("--set", setting)]
     quiet = ["--no-progress", "-j", "1"]
     began = time.process_time() + sum(os.times()[2:4])
     try:
@@ -110,10 +112,12 @@ def chain(line: str, folder: Path, count: int, *, scans: bool) -> dict[str, obje
         if not scans:
             row["step"] = "done"
             return row
+        cone = ORIENTATIONS if len(made["joints"]) >= FULL_AXES else ()
+        sets = [word for setting in (*SETTINGS, *cone) for word in ("--set", setting)]
         row["step"] = "workspace-scan"
-        run("workspace-scan", "cell.yaml", *sets, *quiet, folder=folder)
-        info = json.loads(run("info", "workspace.h5", "--json", folder=folder))
-        row["workspace"] = info.get("score_percent", info.get("path_percent"))
+        answer = run("workspace-scan", "cell.yaml", *sets, *quiet, "--json",
+                     folder=folder)  # fmt: skip
+        row["workspace"] = json.loads(answer)
         row["step"] = "bin-scan"
         answer = run("bin-scan", "--cell", "cell.yaml", *sets, *quiet, "--json",
                      folder=folder)  # fmt: skip
