@@ -79,6 +79,7 @@ COMMANDS: dict[str, Entry] = {
         "Cells",
         {
             "cells": "List the shipped cells, or export one.",
+            "carriers": "List the load carriers that `bin.carrier` takes.",
             "check": "Check a cell: joints, bodies, limits, scan configuration.",
             "new-cell": "Write a commented starter cell for a robot.",
             "schema": "Print the JSON Schema of cells or grasp lists.",

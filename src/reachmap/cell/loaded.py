@@ -152,21 +152,23 @@ def fingerprint(
     """Sha256 of what a cell *is*, whatever its files are called and where they lie.
 
     File references give way to the sha256 of their bytes; description, package
-    folders, parameters and xacro arguments, whose effect is elsewhere, are left out.
+    folders, parameters, the carrier's name and xacro arguments, whose effect is
+    elsewhere, are left out.
     """
     data: dict[str, Any] = json.loads(cell.model_dump_json())
     del data["description"], data["resources"]
     # The numbers that parameters lead to stand in their places.
     del data["parameters"], data["expressions"]
+    del data["bin"]["carrier"]
     robot = data["robot"]
     del robot["xacro_args"], robot["joint_limits"], robot["group"]
     hashes = {name: f"sha256:{digest}" for name, digest in files_sha256.items()}
     robot["urdf"] = sha256_text(_with_filenames(urdf, hashes, bare_names=True))
     robot["srdf"] = sha256_text(srdf) if srdf else None
-    for body in data["bodies"]:
-        mesh = body["shape"]["mesh"]
+    meshes = [(body["name"], body["shape"]["mesh"]) for body in data["bodies"]]
+    for name, mesh in [*meshes, ("bin", data["bin"]["mesh"])]:
         if mesh is not None:
-            mesh["file"] = files_sha256[body_key(body["name"], mesh["file"])]
+            mesh["file"] = files_sha256[body_key(name, mesh["file"])]
     text = json.dumps(data, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
     return sha256_text(text)
 

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+from reachmap.cell.carriers import write_out_carrier
 from reachmap.cell.files.files import compare_hashes, read_files, stored_files
 from reachmap.cell.files.resources import shipped_folder
 from reachmap.cell.loaded import LoadedCell, fingerprint
@@ -99,6 +100,7 @@ def cell_from_text(
     restore_expressions(document)
     apply_overrides(document, overrides, Cell)
     resolve_expressions(document)
+    write_out_carrier(document)
     cell = validated(document)
     files = read_files(document, directory)
     if files.robot is not None:
@@ -239,6 +241,7 @@ def stored_cell(
     restore_expressions(document)
     apply_overrides(document, changes, Cell)
     resolve_expressions(document)
+    write_out_carrier(document)
     cell = validated(document)
     document.raise_mistakes()
     if cell is None:

@@ -215,15 +215,18 @@ def find_doubts(document: Document, cell: Cell, files: CellFiles) -> tuple[str, 
         location: Location = ("bodies", index, "shape")
         mesh = body.shape.mesh
         if mesh is not None:
-            key = body_key(body.name, mesh.file)
-            scale = mesh.scale if isinstance(mesh.scale, tuple) else (mesh.scale,) * 3
-            label = f"mesh of body {body.name!r}"
+            key, label = body_key(body.name, mesh.file), f"mesh of body {body.name!r}"
+            scale = mesh.factors
             doubts += _mesh_doubts(document, files, key, label, scale, location)
         elif (side := float(sides(body.shape).max())) > DOUBTFUL_M:
             doubts.append(_large(document, location, f"body {body.name!r}", side))
+    where: Location = ("bin", "inner")
     if max(cell.bin.inner) > DOUBTFUL_M:
-        where: Location = ("bin", "inner")
         doubts.append(_large(document, where, "the bin", max(cell.bin.inner)))
+    if cell.bin.mesh is not None:
+        key, scale = body_key("bin", cell.bin.mesh.file), cell.bin.mesh.factors
+        where = ("bin", "mesh")
+        doubts += _mesh_doubts(document, files, key, "mesh of the bin", scale, where)
     if files.robot is not None:
         doubts += _links_unchecked(document, cell, files.robot)
         for name, scale in mesh_scales(files.robot.collisions).items():

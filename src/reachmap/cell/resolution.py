@@ -56,9 +56,8 @@ def resolved_cell(
     for key in ("urdf", "srdf"):
         if robot[key]:
             robot[key] = _portable(robot[key], files.resolver)
-    for body in data["bodies"]:
-        if body["shape"]["mesh"]:
-            mesh = body["shape"]["mesh"]
+    for mesh in (*(b["shape"]["mesh"] for b in data["bodies"]), data["bin"]["mesh"]):
+        if mesh:
             mesh["file"] = _portable(mesh["file"], files.resolver)
     _write_out_srdf(document, data, files)
     if files.robot is not None:

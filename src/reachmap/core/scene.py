@@ -81,7 +81,7 @@ class Scene:
             robot,
             bodies,
             cell.collision.safety_margin_m,
-            movable=bin_placements(robot, cell) if bin_moves else (),
+            movable=bin_placements(robot, loaded) if bin_moves else (),
         )
         motions = MotionChecker(
             checker,
@@ -135,7 +135,7 @@ class Scene:
         loaded : LoadedCell
             The same cell but for the bin's pose.
         """
-        self.checker.move(bin_placements(self.robot, loaded.cell))
+        self.checker.move(bin_placements(self.robot, loaded))
         T_base_bin = loaded.cell.T_base_bin()
         return dataclasses.replace(self, loaded=loaded, T_base_bin=T_base_bin)
 

@@ -90,7 +90,10 @@ def _facts(loaded: LoadedCell) -> Table | None:
             (
                 "bin",
                 f"{number(x, 3)} × {number(y, 3)} × {number(z, 3, 'm')} inside, walls "
-                f"{number(1000 * tray.wall, 0, 'mm')}",
+                + " and ".join(
+                    number(1000 * wall, 0, "mm") for wall in dict.fromkeys(tray.walls)
+                )
+                + (f" ({tray.carrier})" if tray.carrier else ""),
             ),
             ("bin stands at", _position(tuple(tray.pose.matrix()[:3, 3].tolist()))),
             (

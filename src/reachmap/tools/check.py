@@ -185,13 +185,16 @@ def _bodies(loaded: LoadedCell) -> tuple[BodyRow, ...]:
         )
         for body in loaded.cell.bodies
     ]
-    inner = " × ".join(f"{side:g}" for side in loaded.cell.bin.inner)
+    tray = loaded.cell.bin
+    inner = " × ".join(f"{side:g}" for side in tray.inner)
+    walls = " and ".join(f"{wall:g}" for wall in dict.fromkeys(tray.walls))
+    carrier = f"{tray.carrier}, " if tray.carrier else ""
     rows.append(
         BodyRow(
             name="bin",
             attach_to="robot_base",
-            shape=f"inside {inner} m, wall {loaded.cell.bin.wall:g} m",
-            touch=loaded.cell.bin.touch,
+            shape=f"{carrier}inside {inner} m, wall {walls} m",
+            touch=tray.touch,
         )
     )
     return tuple(rows)

@@ -6,7 +6,8 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from reachmap.core.collision.bodies import bin_boxes, build_geometry
+from reachmap.cell.model.bin_parts import bin_parts
+from reachmap.core.collision.bodies import build_geometry
 from reachmap.core.collision.checker import LADDER_M
 from tests.support.scenes import scene_of
 
@@ -120,14 +121,14 @@ def _on_the_brink(scene, rng, count):
 def test_the_bin_is_five_boxes_around_its_inner_volume():
     """Boxes fill the outer volume but for the inner one, and do not overlap."""
     spec = scene_of("ur5-eye-in-hand").loaded.cell.bin
-    boxes = bin_boxes(spec)
+    boxes = bin_parts(spec)
     x, y, depth = spec.inner
     bottom = spec.bottom or spec.wall
     outer = (x + 2 * spec.wall) * (y + 2 * spec.wall) * (depth + bottom)
-    volume = sum(np.prod(box.size_m) for box in boxes)
+    volume = sum(np.prod(box.shape.box) for box in boxes)
     assert volume == pytest.approx(outer - x * y * depth)
     rng = np.random.default_rng(8)
     points = rng.uniform([-x / 2, -y / 2, 0], [x / 2, y / 2, depth], (2000, 3))
     for box in boxes:
-        inside = np.abs(points - box.centre_m) < np.array(box.size_m) / 2 - 1e-9
+        inside = np.abs(points - box.centre_m) < np.array(box.shape.box) / 2 - 1e-9
         assert not inside.all(axis=1).any()

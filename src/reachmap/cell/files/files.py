@@ -222,13 +222,16 @@ def _find_urdf_meshes(document: Document, files: CellFiles) -> None:
 
 
 def _find_body_meshes(document: Document, files: CellFiles) -> None:
-    for index, body in enumerate(entries(document.data, "bodies")):
-        reference = text_at(body, "shape", "mesh", "file")
+    owners: list[tuple[str, Location]] = [
+        (text_at(body, "name") or str(index), ("bodies", index, "shape", "mesh"))
+        for index, body in enumerate(entries(document.data, "bodies"))
+    ]
+    for name, location in [*owners, ("bin", ("bin", "mesh"))]:
+        reference = text_at(document.data, *location, "file")
         if not reference:
             continue
-        name = text_at(body, "name") or str(index)
         try:
             path = files.resolver.resolve(reference)
             files.add_mesh(body_key(name, reference), path)
         except (NotFoundError, CellError) as error:
-            _add(document, ("bodies", index, "shape", "mesh", "file"), error)
+            _add(document, (*location, "file"), error)

@@ -149,6 +149,12 @@ class MeshShape(Record):
     )
     scale: Scale = Field(1.0, description="Factor to metres, one or per axis.")
 
+    @property
+    def factors(self) -> tuple[float, float, float]:
+        """Factor to metres along each axis."""
+        scale = self.scale
+        return scale if isinstance(scale, tuple) else (scale, scale, scale)
+
 
 class Shape(Record):
     """Exactly one of ``box``, ``cylinder``, ``capsule``, ``sphere``, ``mesh``."""

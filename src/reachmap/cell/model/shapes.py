@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any, TypeAlias
 
 import numpy as np
+from scipy.spatial import ConvexHull
 
 from reachmap._typing import FloatArray, IntArray
 from reachmap.cell.model.fields import Shape
@@ -46,7 +47,20 @@ class TriangleMesh:
         )
 
 
-Solid: TypeAlias = Shape | TriangleMesh
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ConvexBody:
+    """The convex hull of points.
+
+    Attributes
+    ----------
+    points : array, shape (n, 3)
+        At least four that do not lie in a plane [m].
+    """
+
+    points: FloatArray = field(repr=False)
+
+
+Solid: TypeAlias = Shape | TriangleMesh | ConvexBody
 
 
 def sides(shape: Solid) -> FloatArray:
@@ -57,8 +71,8 @@ def sides(shape: Solid) -> FloatArray:
     ValueError
         The shape is a mesh that has not been read.
     """
-    if isinstance(shape, TriangleMesh):
-        return np.asarray(np.ptp(shape.vertices, axis=0))
+    if not isinstance(shape, Shape):
+        return np.asarray(np.ptp(corner_points(shape), axis=0))
     kind, value = shape.kind()
     if kind == "box":
         return np.array(value, float)
@@ -73,6 +87,8 @@ def corner_points(shape: Solid) -> FloatArray:
     """Points whose convex hull contains the shape, (n, 3) in its own frame [m]."""
     if isinstance(shape, TriangleMesh):
         return shape.vertices
+    if isinstance(shape, ConvexBody):
+        return shape.points
     return box_corners(sides(shape))
 
 
@@ -81,10 +97,29 @@ def box_corners(sides_m: FloatArray) -> FloatArray:
     return np.asarray(_SIGNS * sides_m / 2.0)
 
 
+def shrunk(shape: Solid, by_m: float) -> Solid:
+    """A box, mesh or convex body, smaller by so much along each axis."""
+    if by_m == 0:
+        return shape
+    size = sides(shape)
+    smaller = np.maximum(size - by_m, 1e-6)
+    if isinstance(shape, Shape):
+        x, y, z = smaller.tolist()
+        return Shape(box=(x, y, z))
+    points = corner_points(shape)
+    middle = (points.min(axis=0) + points.max(axis=0)) / 2.0
+    points = middle + (points - middle) * smaller / np.maximum(size, 1e-12)
+    if isinstance(shape, ConvexBody):
+        return ConvexBody(points=points)
+    return TriangleMesh(vertices=points, triangles=shape.triangles)
+
+
 def triangles_of(shape: Solid) -> TriangleMesh:
     """Surface of a shape; round ones have 48 corners, which lie on the true surface."""
     if isinstance(shape, TriangleMesh):
         return shape
+    if isinstance(shape, ConvexBody):
+        return _hull(shape.points)
     kind, value = shape.kind()
     if kind == "box":
         return _box(sides(shape))
@@ -129,6 +164,19 @@ def _box(sides_m: FloatArray) -> TriangleMesh:
     triangles = (corner + np.array([[0, 1, 2], [0, 2, 3]])).reshape(-1, 3)
     return TriangleMesh(
         vertices=np.concatenate(faces) * sides_m / 2.0, triangles=triangles
+    )
+
+
+def _hull(points: FloatArray) -> TriangleMesh:
+    """Surface of a convex hull; triangles share no corners: edges stay sharp."""
+    hull = ConvexHull(points)
+    corners = points[hull.simplices]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    inward = (normal * hull.equations[:, :3]).sum(axis=1) < 0
+    corners[inward] = corners[inward][:, ::-1]
+    return TriangleMesh(
+        vertices=corners.reshape(-1, 3),
+        triangles=np.arange(3 * len(corners)).reshape(-1, 3),
     )
 
 

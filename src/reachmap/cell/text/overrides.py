@@ -19,6 +19,7 @@ from reachmap.disk import is_text, recorded_name
 from reachmap.errors import CellError
 
 MAX_OVERRIDES = 1000
+SOURCE = "--set "
 
 
 def apply_overrides(
@@ -33,7 +34,7 @@ def apply_overrides(
     if len(overrides) > MAX_OVERRIDES:
         raise CellError(f"--set: at most {MAX_OVERRIDES} assignments")
     for text in overrides:
-        place = Place(source=f"--set {recorded_name(text[:120])}")
+        place = Place(source=f"{SOURCE}{recorded_name(text[:120])}")
         try:
             _apply(document, text, place, model)
         except _PathError as error:
@@ -43,6 +44,11 @@ def apply_overrides(
                 Mistake(place=place, message=line.removeprefix(f"{place}:").strip())
                 for line in error.lines
             )
+
+
+def is_override(place: Place) -> bool:
+    """Whether a value was given by an override."""
+    return place.source.startswith(SOURCE)
 
 
 class _PathError(ValueError):

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-import coal
 import numpy as np
 import pinocchio as pin
 
 from reachmap._typing import BoolArray, FloatArray
-from reachmap.core.collision.bodies import ROOT, BinBox, bin_boxes, build_geometry
+from reachmap.cell.model.bin_parts import BinPart
+from reachmap.cell.model.fields import Shape
+from reachmap.cell.model.shapes import corner_points, shrunk
+from reachmap.core.collision.bodies import ROOT, build_geometry, parts_of_bin
+from reachmap.core.collision.shapes import coal_shape
 from reachmap.core.collision.static_bodies import (
     PlacedBodies,
     PlacedBody,
@@ -88,17 +91,19 @@ class BinFit:
     ) -> None:
         geometry = build_geometry(robot, loaded, with_bin=False)
         bodies = bodies_at(robot, geometry, np.zeros(robot.dof) if q is None else q)
-        boxes = bin_boxes(loaded.cell.bin)
+        parts = parts_of_bin(loaded)
         # A little smaller, so that standing on a table is no collision.
-        still_parts = _parts(boxes, CONTACT_M)
+        still_parts = [_part(part, CONTACT_M) for part in parts]
         if empty:
-            still_parts.append(_part(_solid(boxes), CONTACT_M))
+            still_parts.append(_part(_around(parts), CONTACT_M))
         still = PlacedBodies(b for b in bodies if b.joint == ROOT)
         self._groups = [_Group(still, still_parts, loaded)]
         if q is not None:
             margin_m = loaded.cell.collision.safety_margin_m
             arm = PlacedBodies((b for b in bodies if b.joint != ROOT), margin_m)
-            self._groups.append(_Group(arm, _parts(boxes, 0.0), loaded))
+            self._groups.append(
+                _Group(arm, [_part(part, 0.0) for part in parts], loaded)
+            )
 
     def contact(self, T_base_bin: FloatArray) -> BinContact | None:
         """First thing that the bin meets at a pose (4, 4), or None."""
@@ -131,12 +136,11 @@ class ToolFit:
             for b in bodies
             if b.joint == robot.tcp_joint
         ]
-        boxes = bin_boxes(loaded.cell.bin)
         self._walls = PlacedBodies(
             (
-                PlacedBody(name=box.name, joint=ROOT, shape=shape, T=_at(centre))
-                for box, (_, shape, centre) in zip(
-                    boxes, _parts(boxes, 0.0), strict=True
+                PlacedBody(name=name, joint=ROOT, shape=shape, T=_at(centre))
+                for name, shape, centre in (
+                    _part(part, 0.0) for part in parts_of_bin(loaded)
                 )
             ),
             loaded.cell.collision.safety_margin_m,
@@ -184,14 +188,9 @@ class _Group:
     ) -> None:
         self._placed, self._parts = placed, parts
         self._allowed = _Touches(loaded)
-        corners = np.array(
-            [
-                centre + sign * np.array(shape.halfSide)
-                for _, shape, centre in parts
-                for sign in (-1, 1)
-            ]
-        )
-        self._low, self._high = corners.min(axis=0), corners.max(axis=0)
+        boxes = [box_around(shape, _at(centre)) for _, shape, centre in parts]
+        self._low = np.min([low for low, _ in boxes], axis=0)
+        self._high = np.max([high for _, high in boxes], axis=0)
 
     def first_pair(self, T_base_bin: FloatArray) -> tuple[str, PlacedBody] | None:
         """Part of the bin and the body it touches first, or None."""
@@ -209,23 +208,17 @@ class _Group:
         return None
 
 
-def _parts(boxes: Iterable[BinBox], shrink_m: float) -> list[Part]:
-    return [_part(box, shrink_m) for box in boxes]
+def _part(part: BinPart, shrink_m: float) -> Part:
+    """Name, shape and place of a part, smaller by so much along each axis."""
+    return part.name, coal_shape(shrunk(part.shape, shrink_m)), part.centre_m
 
 
-def _part(box: BinBox, shrink_m: float) -> Part:
-    size = np.maximum(np.array(box.size_m) - shrink_m, 1e-6)
-    return box.name, coal.Box(*size), np.array(box.centre_m)
-
-
-def _solid(boxes: tuple[BinBox, ...]) -> BinBox:
+def _around(parts: Sequence[BinPart]) -> BinPart:
     """The box around all parts of a bin, its inside included."""
-    centres = np.array([box.centre_m for box in boxes])
-    halves = np.array([box.size_m for box in boxes]) / 2
-    low, high = (centres - halves).min(axis=0), (centres + halves).max(axis=0)
+    points = np.vstack([corner_points(part.shape) + part.centre_m for part in parts])
+    low, high = points.min(axis=0), points.max(axis=0)
     x, y, z = (high - low).tolist()
-    u, v, w = ((low + high) / 2).tolist()
-    return BinBox(name=WHOLE, size_m=(x, y, z), centre_m=(u, v, w))
+    return BinPart(name=WHOLE, shape=Shape(box=(x, y, z)), centre_m=(low + high) / 2.0)
 
 
 def _at(p: FloatArray) -> FloatArray:

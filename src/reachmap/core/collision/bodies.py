@@ -20,7 +20,7 @@ from reachmap.cell.files.files import body_key
 from reachmap.cell.files.srdf import parse_srdf
 from reachmap.cell.files.urdf import UrdfDescription
 from reachmap.cell.meshes.reading import MeshError, read_mesh
-from reachmap.cell.model.cell import BinSpec, Cell
+from reachmap.cell.model.bin_parts import BinPart, bin_parts
 from reachmap.cell.model.fields import Shape
 from reachmap.cell.model.shapes import Solid
 from reachmap.core.collision.shapes import coal_shape
@@ -35,15 +35,6 @@ if TYPE_CHECKING:
 ROOT = 0
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class BinBox:
-    """One of the five boxes a bin is made of, in the bin frame."""
-
-    name: str
-    size_m: tuple[float, float, float]
-    centre_m: tuple[float, float, float]
-
-
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class BodyGeometry:
     """Geometry of everything in the cell, and the pairs to be checked.
@@ -53,7 +44,7 @@ class BodyGeometry:
     geometry : pinocchio.GeometryModel
     names : tuple of str
         User's name of each geometry object.
-    shapes : tuple of Shape or TriangleMesh
+    shapes : tuple of Shape, TriangleMesh or ConvexBody
         What each is made of.
     """
 
@@ -69,39 +60,29 @@ class BodyGeometry:
         )
 
 
-def bin_boxes(spec: BinSpec) -> tuple[BinBox, ...]:
-    """Bottom and four walls around the inner volume, in the bin frame.
+def parts_of_bin(loaded: LoadedCell) -> tuple[BinPart, ...]:
+    """Parts of a cell's bin, its mesh read where it has one.
 
-    The frame's origin is the centre of the inner bottom, z up.
+    Raises
+    ------
+    SceneError
+        The mesh cannot be read.
     """
-    x, y, depth = spec.inner
-    wall = spec.wall
-    bottom = spec.bottom if spec.bottom is not None else wall
-    outer_y = y + 2 * wall
-    height, middle = depth + bottom, (depth - bottom) / 2
-    walls = [
-        (
-            f"bin wall {sign}x",
-            (wall, outer_y, height),
-            (s * (x + wall) / 2, 0.0, middle),
-        )
-        for sign, s in (("+", 1), ("-", -1))
-    ] + [
-        (f"bin wall {sign}y", (x, wall, height), (0.0, s * (y + wall) / 2, middle))
-        for sign, s in (("+", 1), ("-", -1))
-    ]
-    floor = ("bin bottom", (x, y, bottom), (0.0, 0.0, -bottom / 2))
-    return tuple(BinBox(name=n, size_m=s, centre_m=c) for n, s, c in (floor, *walls))
+    spec, shell = loaded.cell.bin, None
+    if spec.mesh is not None:
+        key = body_key("bin", spec.mesh.file)
+        shell = _read_mesh(loaded, key, "bin", spec.mesh.scale)
+    return bin_parts(spec, shell)
 
 
-def bin_placements(robot: RobotModel, cell: Cell) -> dict[str, FloatArray]:
-    """Poses (4, 4) of the bin's boxes in the model's root frame, by name."""
-    T_root_bin = robot.T_root_base @ cell.T_base_bin()
+def bin_placements(robot: RobotModel, loaded: LoadedCell) -> dict[str, FloatArray]:
+    """Poses (4, 4) of the bin's parts in the model's root frame, by name."""
+    T_root_bin = robot.T_root_base @ loaded.cell.T_base_bin()
     return {
-        box.name: np.asarray(
-            T_root_bin @ transform_from_parts(np.eye(3), np.array(box.centre_m))
+        part.name: np.asarray(
+            T_root_bin @ transform_from_parts(np.eye(3), part.centre_m)
         )
-        for box in bin_boxes(cell.bin)
+        for part in parts_of_bin(loaded)
     }
 
 
@@ -129,10 +110,9 @@ def build_geometry(
         shape = _body_shape(loaded, body.name, body.shape)
         builder.add(body.name, joint, T_joint_frame @ body.pose.matrix(), shape)
     if with_bin:
-        placements = bin_placements(robot, loaded.cell)
-        for box in bin_boxes(loaded.cell.bin):
-            shape = Shape(box=box.size_m)
-            builder.add(box.name, ROOT, placements[box.name], shape)
+        placements = bin_placements(robot, loaded)
+        for part in parts_of_bin(loaded):
+            builder.add(part.name, ROOT, placements[part.name], part.shape)
     touches = [(body.name, body.touch) for body in loaded.cell.bodies]
     if with_bin:
         touches.append(("bin", loaded.cell.bin.touch))
@@ -225,7 +205,7 @@ class _Builder:
     def allow(
         self, touches: Iterable[tuple[str, tuple[str, ...]]], *, with_bin: bool
     ) -> None:
-        """Take out the pairs that may touch; ``bin`` stands for its five boxes."""
+        """Take out the pairs that may touch; ``bin`` stands for its parts."""
         model = self.robot.body_model
         links = {f.name.removesuffix(LINK_MARK) for f in model.frames}
         known = {*self.names, *links, "world", "robot_base", "bin"}
@@ -254,7 +234,7 @@ class _Builder:
                 self.geometry.removeCollisionPair(pin.CollisionPair(first, second))
 
     def _expand(self, a: str, b: str, *, with_bin: bool) -> Iterable[tuple[str, str]]:
-        boxes = [n for n in self.names if with_bin and n.startswith("bin ")]
-        for first in boxes if a == "bin" else [a]:
-            for second in boxes if b == "bin" else [b]:
+        parts = [n for n in self.names if with_bin and n.startswith("bin ")]
+        for first in parts if a == "bin" else [a]:
+            for second in parts if b == "bin" else [b]:
                 yield first, second

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
 from reachmap._typing import FloatArray
-from reachmap.cell.model.shapes import Solid, TriangleMesh
+from reachmap.cell.model.shapes import ConvexBody, Solid, TriangleMesh
 
 # A hundredth of what a safety margin usually is.
 FLAT_M = 1e-5
@@ -30,6 +30,8 @@ def coal_shape(shape: Solid) -> Any:
         surface.addTriangles(np.ascontiguousarray(shape.triangles, np.int64))
         surface.endModel()
         return surface
+    if isinstance(shape, ConvexBody):
+        return convex_hull(shape.points)
     kind, value = shape.kind()
     if kind == "box":
         return coal.Box(*value)

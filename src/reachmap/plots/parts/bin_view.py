@@ -28,19 +28,20 @@ class BinView:
     Attributes
     ----------
     bin_map : BinMap
-    wall : float
-        Thickness of the walls [m].
+    outer : array, shape (2,)
+        Outer x and y of the bin, rim included [m].
     cell_name : str
     """
 
     bin_map: BinMap
-    wall: float
+    outer: FloatArray
     cell_name: str
 
     @property
     def margin(self) -> float:
         """Room between the inner bottom and the edge of the picture [m]."""
-        return self.wall + 0.09 * float(self.bin_map.bin_inner[:2].min())
+        inner = self.bin_map.bin_inner[:2]
+        return float((self.outer - inner).max()) / 2.0 + 0.09 * float(inner.min())
 
     def view(self) -> FloatArray:
         """Lower and upper corner of the picture in the bin frame [m], shape (2, 2)."""
@@ -58,8 +59,10 @@ class BinView:
 def view_of(bin_map: BinMap) -> BinView:
     """Bring together a bin map and what its cell says of the bin."""
     context = context_of(bin_map.provenance)
-    wall = NOMINAL_WALL if context.cell is None else context.cell.bin.wall
-    return BinView(bin_map=bin_map, wall=wall, cell_name=context.name)
+    outer = bin_map.bin_inner[:2] + 2.0 * NOMINAL_WALL
+    if context.cell is not None:
+        outer = np.array(context.cell.bin.outer[:2])
+    return BinView(bin_map=bin_map, outer=outer, cell_name=context.name)
 
 
 def percent_after(bin_map: BinMap, attempts: int) -> FloatArray:
@@ -73,8 +76,7 @@ def percent_after(bin_map: BinMap, attempts: int) -> FloatArray:
 def frame_bin(axes: Axes, view: BinView) -> None:
     """Draw the walls to scale and an arrow towards the robot; set the limits."""
     inner = np.asarray(view.bin_map.bin_inner[:2])
-    outer = inner + 2.0 * view.wall
-    for sides, width in ((inner, 0.9), (outer, 1.8)):
+    for sides, width in ((inner, 0.9), (view.outer, 1.8)):
         axes.add_patch(
             Rectangle(
                 (-sides[0] / 2.0, -sides[1] / 2.0),
@@ -96,7 +98,7 @@ def frame_bin(axes: Axes, view: BinView) -> None:
 def _point_to_robot(axes: Axes, view: BinView) -> None:
     robot = inverse_transform(view.bin_map.bin_pose)[:2, 3]
     distance = float(np.linalg.norm(robot))
-    half = np.asarray(view.bin_map.bin_inner[:2]) / 2.0 + view.wall
+    half = view.outer / 2.0
     if (np.abs(robot) < half).all():
         return
     towards = robot / distance
@@ -104,7 +106,7 @@ def _point_to_robot(axes: Axes, view: BinView) -> None:
     with np.errstate(divide="ignore"):
         exits = half / np.abs(towards)
     exit_at = float(exits.min())
-    room = view.margin - view.wall
+    room = view.margin - float((view.outer - view.bin_map.bin_inner[:2]).max()) / 2.0
     start, end = (towards * (exit_at + part * room) for part in (0.12, 0.92))
     axes.add_patch(
         FancyArrowPatch(

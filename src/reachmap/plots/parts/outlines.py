@@ -107,16 +107,16 @@ def body_outlines(cell: Cell) -> tuple[Outline, ...]:
 def bin_outlines(
     spec: BinSpec, T_level_bin: FloatArray, *, name: str = "bin", kind: Kind = "bin"
 ) -> tuple[Outline, ...]:
-    """Inner and outer rectangle of a bin in a pose; only the outer has the name.
+    """Opening and outer rectangle of a bin in a pose; only the outer has the name.
 
     The heights are those of the bin from under its bottom to its rim.
     """
-    x, y, depth = spec.inner
-    bottom = spec.wall if spec.bottom is None else spec.bottom
     outlines = []
-    for label, margin in ((name, spec.wall), ("", 0.0)):
-        sides = np.array([x + 2 * margin, y + 2 * margin, depth + bottom])
-        points = box_corners(sides) + np.array([0.0, 0.0, (depth - bottom) / 2.0])
+    for label, ledge in ((name, True), ("", False)):
+        x, y = spec.outer[:2] if ledge else spec.top
+        height = spec.inner[2] + spec.bottom_m
+        points = box_corners(np.array([x, y, height]))
+        points += np.array([0.0, 0.0, (spec.inner[2] - spec.bottom_m) / 2.0])
         outlines.append(hull_outline(label, kind, _moved(T_level_bin, points)))
     return tuple(outlines)
 
