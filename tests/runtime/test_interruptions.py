@@ -36,9 +36,9 @@ def command(output, *options, **toy):
     ]
 
 
-def start(output, *options, limit=None, **toy):
+def start(output, *options, limit=None, more=None, **toy):
     """Start a toy scan in a session of its own."""
-    environment = {**os.environ, "PYTHONPATH": str(SCRIPT.parents[2])}
+    environment = {**os.environ, "PYTHONPATH": str(SCRIPT.parents[2]), **(more or {})}
 
     def before_start():
         # A shell starts what it runs in the background with Ctrl-C ignored.
@@ -128,7 +128,7 @@ def kill_at_random_moments(output, count, seed):
     return deaths
 
 
-@pytest.mark.parametrize("count", [5, pytest.param(30, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [5, pytest.param(200, marks=pytest.mark.slow)])
 def test_killed_at_random_moments_and_resumed(tmp_path, count):
     """After any number of SIGKILLs the artefact is that of an undisturbed run."""
     deaths = seed = 0
@@ -228,4 +228,41 @@ def test_a_second_run_on_one_output_is_refused(tmp_path):
     first.send_signal(signal.SIGINT)
     first.communicate(timeout=60)
     assert finish(output, "-j", "1")[0] == 0
+    assert json.loads(output.read_text()) == expected()
+
+
+def test_no_room_for_the_artefact(tmp_path):
+    """All units fit, the artefact does not: exit code 3 names what is safe."""
+    output = tmp_path / "out.json"
+
+    def limit():
+        resource.setrlimit(resource.RLIMIT_FSIZE, (50_000, 50_000))
+
+    more = {"TOY_PADDING": "100000"}
+    process = start(output, "-j", "1", units=60, limit=limit, more=more)
+    _, err = process.communicate(timeout=60)
+    assert process.returncode == 3, err
+    assert f"60 of 60 units are safe in {store_path(output)}" in err
+    assert list(tmp_path.iterdir()) == [store_path(output)]
+    code, counts, err = finish(output, "-j", "1", units=60)
+    assert (code, counts) == (0, ["0", "60"]), err
+    assert json.loads(output.read_text()) == expected(units=60)
+
+
+@pytest.mark.parametrize("moment", ["os.fsync", "os.link", "pathlib.Path.unlink"])
+def test_killed_while_publishing(tmp_path, moment):
+    """Whatever moment it is, the same command ends well and leaves the output alone."""
+    output, seen = tmp_path / "out.json", 0
+    for count in range(1, 9):
+        environment = {"TOY_DIES_AT": f"{moment}:{count}"}
+        process = start(output, "-j", "1", more=environment)
+        process.communicate(timeout=60)
+        if process.returncode == 0:
+            break
+        assert process.returncode == -signal.SIGKILL
+        seen += 1
+    else:
+        assert finish(output, "-j", "1")[0] == 0
+    assert seen >= 1
+    assert list(tmp_path.iterdir()) == [output]
     assert json.loads(output.read_text()) == expected()

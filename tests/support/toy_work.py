@@ -114,9 +114,28 @@ def bits(payload):
     ]
 
 
+def die_at(moment):
+    """Kill this process just before the n-th call of a function: ``os.link:2``."""
+    name, _, count = moment.partition(":")
+    owner, _, attribute = name.rpartition(".")
+    where = {"os": os, "pathlib.Path": Path}[owner]
+    before, left = getattr(where, attribute), [int(count)]
+
+    def deadly(*arguments, **settings):
+        left[0] -= 1
+        if not left[0]:
+            os.kill(os.getpid(), signal.SIGKILL)
+        return before(*arguments, **settings)
+
+    setattr(where, attribute, deadly)
+
+
 def write(path, artefact, *, overwrite=False):
     """Publish the text."""
-    publish(path, [json.dumps(artefact).encode()], overwrite=overwrite)
+    if moment := os.environ.get("TOY_DIES_AT"):
+        die_at(moment)
+    padding = b" " * int(os.environ.get("TOY_PADDING", "0"))
+    publish(path, [json.dumps(artefact).encode(), padding], overwrite=overwrite)
 
 
 KIND = Kind(name="toy", blank=blank, assemble=assemble, write=write)

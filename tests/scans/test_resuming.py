@@ -1,0 +1,86 @@
+"""Surveys and roadmaps that an earlier run left are not worked out again."""
+
+from __future__ import annotations
+
+import pytest
+
+from reachmap.maps import read_bin_map, read_workspace_map
+from reachmap.runtime.journal import read_store
+from reachmap.runtime.signals import Interrupted
+from reachmap.runtime.store import store_path
+from reachmap.scans import bin_scan as planning
+from reachmap.scans import ik_survey, workspace_roadmap
+from reachmap.tools.bin_scan import bin_scan
+from reachmap.tools.workspace_scan import workspace_scan
+
+SMALL = ("bin_scan.grid=[3,3]", "bin_scan.repeats=1")
+
+
+@pytest.fixture
+def blocks_of_50(monkeypatch):
+    """Surveys in several units, although the cell is small."""
+    monkeypatch.setattr(ik_survey, "FRAMES_PER_UNIT", 50)
+
+
+def never(*arguments, **settings):
+    """Stand in for what was done before."""
+    raise AssertionError("worked out again")
+
+
+def interrupted(*arguments, **settings):
+    """Stand in for Ctrl-C."""
+    raise KeyboardInterrupt
+
+
+def interrupt_after(function, count):
+    """Ctrl-C in the call after so many."""
+    calls = []
+
+    def call(*arguments, **settings):
+        calls.append(1)
+        if len(calls) > count:
+            raise KeyboardInterrupt
+        return function(*arguments, **settings)
+
+    return call
+
+
+@pytest.mark.usefixtures("blocks_of_50")
+def test_a_workspace_scan_by_roadmap_goes_on(tmp_path, monkeypatch):
+    """Interrupted in the survey, then between survey and map: the hash is the same."""
+    output = tmp_path / "w.h5"
+    workspace_scan("planar-toy", tmp_path / "whole.h5")
+    with monkeypatch.context() as change:
+        survey = interrupt_after(ik_survey.survey_frames, 5)
+        change.setattr(ik_survey, "survey_frames", survey)
+        with pytest.raises(Interrupted, match="0 of 1 units are safe"):
+            workspace_scan("planar-toy", output)
+    with read_store(store_path(output)) as entries:
+        assert len(entries.results("survey")) == 5
+    with monkeypatch.context() as change:
+        change.setattr(workspace_roadmap, "connect_survey", interrupted)
+        with pytest.raises(Interrupted):
+            workspace_scan("planar-toy", output)
+    with monkeypatch.context() as change:
+        change.setattr(ik_survey, "survey_frames", never)
+        workspace_scan("planar-toy", output)
+    whole, resumed = (read_workspace_map(tmp_path / n) for n in ("whole.h5", "w.h5"))
+    assert resumed.stamp.content_sha256 == whole.stamp.content_sha256
+    assert not store_path(output).exists()
+
+
+@pytest.mark.usefixtures("blocks_of_50")
+def test_a_bin_scan_goes_on_in_its_survey(tmp_path, monkeypatch):
+    """Neither survey nor roadmap is worked out twice."""
+    output = tmp_path / "b.h5"
+    bin_scan(None, tmp_path / "whole.h5", cell="planar-toy", overrides=SMALL)
+    with monkeypatch.context() as change:
+        change.setattr(planning, "plan_grasps", interrupted)
+        with pytest.raises(Interrupted):
+            bin_scan(None, output, cell="planar-toy", overrides=SMALL)
+    with monkeypatch.context() as change:
+        change.setattr(ik_survey, "survey_frames", never)
+        change.setattr(planning, "connect_survey", never)
+        bin_scan(None, output, cell="planar-toy", overrides=SMALL)
+    whole, resumed = (read_bin_map(tmp_path / name) for name in ("whole.h5", "b.h5"))
+    assert resumed.stamp.content_sha256 == whole.stamp.content_sha256
