@@ -128,10 +128,16 @@ def kill_at_random_moments(output, count, seed):
     return deaths
 
 
-@pytest.mark.parametrize("count", [5, pytest.param(200, marks=pytest.mark.slow)])
-def test_killed_at_random_moments_and_resumed(tmp_path, count):
+@pytest.mark.parametrize(
+    ("count", "seed"),
+    [
+        (5, 0),
+        *(pytest.param(50, k, marks=pytest.mark.slow) for k in range(1, 500, 100)),
+    ],
+)
+def test_killed_at_random_moments_and_resumed(tmp_path, count, seed):
     """After any number of SIGKILLs the artefact is that of an undisturbed run."""
-    deaths = seed = 0
+    deaths = 0
     while deaths < count:
         output = tmp_path / f"out-{seed}.json"
         deaths += kill_at_random_moments(output, count - deaths, seed)

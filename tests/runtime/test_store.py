@@ -122,7 +122,7 @@ def test_any_damage_costs_a_unit_at_most(path, tries):
                 put(store, unit)
         assert all(value == {"value": unit * unit} for unit, value in kept.items())
         if len(data) == len(whole):
-            assert (len(kept) >= 4, bool(said)) == (True, True)
+            assert len(kept) == 5 or (len(kept) == 4 and said)
         assert contents(path) == {unit: {"value": unit * unit} for unit in range(5)}
 
 

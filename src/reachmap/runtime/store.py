@@ -132,6 +132,7 @@ class Store(Entries):
             is_good = os.pread(self._descriptor, size, other) == line
             if is_good and os.pread(self._descriptor, size, here) != line:
                 _write_all(self._descriptor, line, here)
+                self.end = max(self.end, 2 * size)
 
 
 @contextmanager
