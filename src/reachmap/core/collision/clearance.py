@@ -10,8 +10,9 @@ import pinocchio as pin
 from reachmap._typing import FloatArray, IntArray
 from reachmap.core.collision.checker import CollisionChecker, guess_nothing
 
-TOLERANCE_M = 1e-3
-"""By which a clearance may be greater than the least there is anywhere on the path."""
+TOLERANCE_M, TOLERANCE_SHARE = 1e-3, 0.1
+"""By how much, or by what share of itself if that is more, a clearance may be greater
+than the least there is anywhere on the path. Half as much takes twice the time."""
 
 
 class ClearanceMeter:
@@ -42,7 +43,7 @@ class ClearanceMeter:
 
         The path is halved until what lies between two configurations cannot be
         closer, by the bound on how far a motion moves each pair against each other, so
-        that no place is narrower by more than a millimetre.
+        that no place is narrower by more than the tolerance.
 
         Parameters
         ----------
@@ -60,12 +61,13 @@ class ClearanceMeter:
         if count == 0:
             return float("nan"), -1
         self._least, self._pair = np.inf, -1
-        everything = np.arange(count)
-        nothing_known = np.full(count, -np.inf)
         # The last way-point, at the grasp, is the narrowest as a rule.
-        ends = [self._distances(q, everything, nothing_known) for q in path[::-1]][::-1]
+        d = self._distances(path[-1], np.arange(count), np.full(count, -np.inf))
         for k in range(len(path) - 1, 0, -1):
-            self._halve(path[k - 1], path[k], ends[k - 1], ends[k])
+            known = d - self._moved(path[k - 1], path[k])
+            d_before = self._distances(path[k - 1], self._near(known), known)
+            self._halve(path[k - 1], path[k], d_before, d)
+            d = d_before
         return float(self._least), int(self._checker.pair_index[self._pair])
 
     def _halve(
@@ -76,14 +78,22 @@ class ClearanceMeter:
         while waiting:
             a, b, d_a, d_b = waiting.pop()
             # A pair that moves by r on the way is nowhere nearer than this.
-            moved = self._checker.pair_reach_m @ np.abs(b - a)
-            least = 0.5 * (d_a + d_b - moved)
-            near = np.flatnonzero(least < self._least - TOLERANCE_M)
+            least = 0.5 * (d_a + d_b - self._moved(a, b))
+            near = self._near(least)
             if not len(near):
                 continue
             middle = 0.5 * (a + b)
             d_middle = self._distances(middle, near, least)
             waiting += [(a, middle, d_a, d_middle), (middle, b, d_middle, d_b)]
+
+    def _moved(self, q_from: FloatArray, q_to: FloatArray) -> FloatArray:
+        """Bound on how far a motion moves each pair [m]."""
+        return np.asarray(self._checker.pair_reach_m @ np.abs(q_to - q_from))
+
+    def _near(self, least: FloatArray) -> IntArray:
+        """Pairs that may be narrower than all so far, by more than is allowed."""
+        allowed = max(TOLERANCE_M, TOLERANCE_SHARE * self._least)
+        return np.flatnonzero(least < self._least - allowed)
 
     def _distances(
         self, q: FloatArray, pairs: IntArray, known: FloatArray
