@@ -82,7 +82,7 @@ COMMANDS: dict[str, Entry] = {
             "carriers": "List the load carriers that `bin.carrier` takes.",
             "check": "Check a cell: joints, bodies, limits, scan configuration.",
             "new-cell": "Write a commented starter cell for a robot.",
-            "schema": "Print the JSON Schema of cells or grasp lists.",
+            "schema": "Print the JSON Schema of cells, grasp lists or ranked lists.",
         },
     ),
     **_section(

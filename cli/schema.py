@@ -9,9 +9,9 @@ import click
 
 
 @click.command()
-@click.argument("name", type=click.Choice(["cell", "grasps"]))
+@click.argument("name", type=click.Choice(["cell", "grasps", "ranked"]))
 def command(name: Any) -> None:
-    """Print the JSON Schema of cells or grasp lists.
+    """Print the JSON Schema of cells, grasp lists or ranked lists.
 
     Editors that know JSON Schema complete keys and mark mistakes while one types; a
     first line "# yaml-language-server: $schema=cell-1.schema.json" connects the two.

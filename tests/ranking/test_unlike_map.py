@@ -6,6 +6,7 @@ import json
 from collections import Counter
 from pathlib import Path
 
+import jsonschema
 import numpy as np
 import pytest
 from click.testing import CliRunner, Result
@@ -183,6 +184,14 @@ def test_gates(folder: Path, options: list[str], code: int) -> None:
     if code == 1:
         assert json.loads(result.stdout)["grasps"]
         assert "grasps are reachable" in result.stderr
+
+
+@pytest.mark.parametrize("change", ["", "normals", "camera"])
+def test_ranked_lists_follow_their_schema(folder: Path, change: str) -> None:
+    """Reachable grasps, unreachable ones and such that the map does not know."""
+    result = run(written(folder, change), "--likeness", "0.5")
+    schema = json.loads(CliRunner().invoke(group, ["schema", "ranked"]).stdout)
+    jsonschema.validate(json.loads(result.stdout), schema)
 
 
 def test_a_list_without_reachable_grasps_can_fail(folder: Path) -> None:

@@ -8,19 +8,19 @@ from typing import Any, Literal
 
 from reachmap.cell.model.cell import cell_schema
 
-SchemaName = Literal["cell", "grasps"]
+SchemaName = Literal["cell", "grasps", "ranked"]
 
 
 def schema(name: SchemaName) -> dict[str, Any]:
-    """JSON Schema of cell files or of grasp lists.
+    """JSON Schema of cell files, of grasp lists or of ranked ones.
 
     Parameters
     ----------
-    name : {"cell", "grasps"}
+    name : {"cell", "grasps", "ranked"}
     """
     if name == "cell":
         return cell_schema()
     folder = resources.files("reachmap.ranking")
-    text = folder.joinpath("grasps-1.schema.json").read_text(encoding="utf-8")
+    text = folder.joinpath(f"{name}-1.schema.json").read_text(encoding="utf-8")
     loaded: dict[str, Any] = json.loads(text)
     return loaded
