@@ -76,6 +76,10 @@ COMMANDS: dict[str, Entry] = {
         },
     ),
     **_section(
+        "Line",
+        {"export": "Write verified motions of a bin map for controllers."},
+    ),
+    **_section(
         "Cells",
         {
             "cells": "List the shipped cells, or export one.",

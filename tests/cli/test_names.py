@@ -67,6 +67,7 @@ def test_an_input_that_is_no_file(command: str, name: str, here: Path) -> None:
     new = ("-o", "new.h5")
     more = dict.fromkeys(("merge", "workspace-scan", "bin-scan"), new)
     more["validate"] = ("grasps.json",)
+    more["export"] = ("--all",)
     arguments = (name, *more.get(command, ()))
     if command == "compare":
         arguments = (name, "bin.h5")

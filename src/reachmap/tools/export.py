@@ -1,0 +1,96 @@
+"""``reachmap export``: a bin map in, verified motions out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from reachmap.core.robot.model import RobotModel
+from reachmap.errors import SettingsError
+from reachmap.maps import read_bin_map
+from reachmap.maps.bytes.publish import check_outputs, publish
+from reachmap.maps.records import BinMap
+from reachmap.motions.formats import WRITERS, Origin
+from reachmap.motions.motion import Motion, best_rows, motion_of, row_of
+from reachmap.tools.options import cell_of_artefact
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Exported:
+    """Motions as text."""
+
+    motions: tuple[Motion, ...]
+    text: str
+    written: Path | None = None
+
+
+def export(
+    map_path: Path,
+    *,
+    grasps: Sequence[str] = (),
+    every: bool = False,
+    to: str = "csv",
+    output: Path | None = None,
+    overwrite: bool = False,
+) -> Exported:
+    """Write the best stored paths of a bin map for a controller or a program.
+
+    Parameters
+    ----------
+    map_path : Path
+    grasps : sequence of str
+        Test grasps as ``y,x,orientation`` or ``layer,y,x,orientation``.
+    every : bool
+        All test grasps that have a path.
+    to : str
+        One of :data:`reachmap.motions.formats.WRITERS`.
+    output : Path, optional
+        File to write.
+    overwrite : bool
+
+    Raises
+    ------
+    SettingsError
+        Nothing or too much was named, or the format cannot say it.
+    MapFileError, OutputError
+    """
+    if every == bool(grasps):
+        raise SettingsError("name test grasps with --grasp, or take --all of them")
+    if to not in WRITERS:
+        raise SettingsError(f"--to {to}: expected one of {', '.join(WRITERS)}")
+    check_outputs([output], overwrite=overwrite, inputs=[map_path])
+    bin_map = read_bin_map(map_path)
+    rows = (
+        list(best_rows(bin_map).values())
+        if every
+        else [row_of(bin_map, name) for name in dict.fromkeys(grasps)]
+    )
+    if not rows:
+        raise SettingsError(f"{map_path}: no test grasp has a path")
+    origin = _origin(bin_map, map_path)
+    motions = tuple(
+        motion_of(bin_map, row, origin.velocity, origin.acceleration) for row in rows
+    )
+    text = WRITERS[to](motions, origin)
+    if output is not None:
+        publish(output, [text.encode()], overwrite=overwrite)
+    return Exported(motions=motions, text=text, written=output)
+
+
+def _origin(bin_map: BinMap, map_path: Path) -> Origin:
+    loaded = cell_of_artefact(bin_map.provenance, str(map_path))
+    robot = RobotModel.from_cell(loaded)
+    tcp = loaded.cell.robot.tcp
+    numbers = ", ".join(f"{value:g}" for value in tcp.matrix().ravel())
+    return Origin(
+        map_sha256=bin_map.stamp.content_sha256,
+        cell_sha256=bin_map.stamp.cell_sha256,
+        cell=loaded.cell.name,
+        base=loaded.cell.robot.base_frame or "robot_base",
+        tcp=f"in {tcp.parent}, 4x4 by rows [{numbers}]",
+        joint_names=bin_map.joint_names,
+        is_revolute=robot.is_revolute,
+        velocity=robot.velocity_rad_s,
+        acceleration=robot.acceleration_rad_s2,
+    )
