@@ -13,12 +13,12 @@ SMALL = "--set bin_scan.grid=[3,2] --set bin_scan.repeats=1"
 RUNS = [
     "workspace-scan planar-toy -j 2",
     f"bin-scan --cell planar-toy {SMALL} -j 2",
+    f"bin-scan --cell planar-toy {SMALL} -j 2 --executor dask:local -o dask.h5",
     "heatmap workspace.h5 -o pictures",
     f"rank {EXAMPLE} --map bin.h5 --chart chart.png -o ranked.json",
     "report . -o report.html",
     "view bin.h5 --html view.html",
     "verify workspace.h5 bin.h5",
-    "cells --export bin.h5 -o cell.yaml",
     "compare bin.h5 bin.h5 --picture change.png",
     "info bin.h5",
 ]
@@ -31,6 +31,7 @@ def test_20_runs_leave_nothing_in_the_temporary_folder(
 ) -> None:
     """With and without a home that can be written to."""
     pytest.importorskip("viser")
+    pytest.importorskip("distributed")
     for home in ("home", "/proc/none"):
         folder = tmp_path / Path(home).name
         (folder / "tmp").mkdir(parents=True)

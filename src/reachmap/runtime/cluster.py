@@ -8,6 +8,7 @@ import time
 from collections.abc import Iterator
 from concurrent.futures import Executor, Future
 from contextlib import ExitStack, contextmanager
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from reachmap.errors import IncompleteError, MissingExtraError, SettingsError
@@ -141,7 +142,9 @@ def _local_cluster(workers: int) -> Iterator[Any]:
         "distributed.deploy.lost-worker-timeout": "1 day",
     }
     with (
-        dask.config.set(settings),
+        # Its own folder for temporary files would stay for ever.
+        TemporaryDirectory(prefix="reachmap-", ignore_cleanup_errors=True) as folder,
+        dask.config.set(settings | {"temporary-directory": folder}),
         _distributed().LocalCluster(
             n_workers=worker_count(workers, workers),  # they all start at once
             threads_per_worker=1,
