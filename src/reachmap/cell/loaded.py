@@ -138,6 +138,33 @@ class LoadedCell:
             q = {name: float(value) for name, value in scan_configuration_rad.items()}
             changed = ScanConfiguration(q_rad=q)
             cell = cell.model_copy(update={"scan_configuration": changed})
+        return self._with_cell(cell)
+
+    def fillings(self) -> tuple[LoadedCell, ...]:
+        """The cell for each level of the parts in its bin, which has no other layer.
+
+        The parts below the level are an obstacle. A cell whose layers are not levels
+        of a filling is its own only one.
+        """
+        spec = self.cell.bin_scan
+        if not spec.is_filled:
+            return (self,)
+        return tuple(self.filled_to(k) for k in range(len(spec.layers)))
+
+    def filled_to(self, layer: int) -> LoadedCell:
+        """The cell with its bin filled to one of the layers, the only one left."""
+        cell, spec = self.cell, self.cell.bin_scan
+        heap = max(spec.heap_m(layer), cell.bin.heap)
+        levels = {"layers": (spec.layers[layer],), "fill": None, "fill_heights_m": None}
+        changed = cell.model_copy(
+            update={
+                "bin": cell.bin.model_copy(update={"heap": heap}),
+                "bin_scan": spec.model_copy(update=levels),
+            }
+        )
+        return self._with_cell(changed)
+
+    def _with_cell(self, cell: Cell) -> LoadedCell:
         return dataclasses.replace(
             self,
             cell=cell,

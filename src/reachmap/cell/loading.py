@@ -10,6 +10,7 @@ from typing import NamedTuple
 from reachmap.cell.carriers import write_out_carrier
 from reachmap.cell.files.files import compare_hashes, read_files, stored_files
 from reachmap.cell.files.resources import shipped_folder
+from reachmap.cell.filling import write_out_fill
 from reachmap.cell.loaded import LoadedCell, fingerprint
 from reachmap.cell.model.cell import Cell
 from reachmap.cell.mounting import check_bin_stands, leaning_levels
@@ -101,6 +102,7 @@ def cell_from_text(
     apply_overrides(document, overrides, Cell)
     resolve_expressions(document)
     write_out_carrier(document)
+    write_out_fill(document)
     cell = validated(document)
     files = read_files(document, directory)
     if files.robot is not None:
@@ -242,6 +244,7 @@ def stored_cell(
     apply_overrides(document, changes, Cell)
     resolve_expressions(document)
     write_out_carrier(document)
+    write_out_fill(document)
     cell = validated(document)
     document.raise_mistakes()
     if cell is None:

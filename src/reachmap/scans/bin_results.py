@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -96,6 +96,28 @@ class GraspResults:
             row_size=np.zeros(0, np.int64),
             planned_size=np.zeros(0, np.int64),
             place=np.zeros((0, 2), np.int64),
+        )
+
+    def renumbered(self, pair: IntArray, first_component: int) -> GraspResults:
+        """The same with other numbers for pairs of bodies and components.
+
+        Parameters
+        ----------
+        pair : int array, shape (pairs,)
+            New number of each pair.
+        first_component : int
+            Number of component 0.
+        """
+        margins = self.margins.copy()
+        closest = np.nan_to_num(margins[:, 1], nan=NO_PAIR).astype(np.int64)
+        margins[closest >= 0, 1] = pair[closest[closest >= 0]]
+        blocking, there = self.blocking_pair.copy(), self.blocking_pair >= 0
+        blocking[there] = pair[blocking[there]]
+        component = np.where(
+            self.component >= 0, self.component + first_component, self.component
+        )
+        return replace(
+            self, margins=margins, blocking_pair=blocking, component=component
         )
 
     @classmethod

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -133,6 +133,16 @@ def _roadmap_from_payload(survey: Survey, payload: Mapping[str, Any]) -> BinRoad
             network=None if network is None else RouteNetwork(**network),
         ),
     )
+
+
+def join_components(parts: Sequence[Components]) -> Components:
+    """Evidence of several roadmaps, their components numbered on."""
+    joined = {
+        field.name: np.concatenate([getattr(part, field.name) for part in parts])
+        for field in dataclasses.fields(Components)
+        if field.name != "methods"
+    }
+    return Components(**joined, methods=parts[0].methods)
 
 
 def components_from_payload(values: Mapping[str, Any]) -> Components:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -17,13 +17,16 @@ from reachmap.core.planning.planner import PlanResult
 from reachmap.core.planning.timing import path_length_rad
 from reachmap.core.scene import Scene
 from reachmap.maps import BinMap, RunInfo, Status, write_bin_map
-from reachmap.runtime.job import Job, Kind, Stages, Work, blocks
+from reachmap.maps.parts import Components
+from reachmap.runtime.job import Job, Kind, Stages, Work, blocks, one_frame
+from reachmap.runtime.progress import Progress
 from reachmap.scans.bin_results import GraspResults, assemble_bin_map
 from reachmap.scans.bin_roadmap import (
     BinRoadmap,
     components_from_payload,
     connected_grasps,
     grasp_grid,
+    join_components,
 )
 from reachmap.scans.document import journal_settings
 from reachmap.scans.ik_survey import Survey
@@ -39,10 +42,42 @@ GRASPS_PER_UNIT = 45
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BinContext:
-    """What a worker needs: the cell, and what is known of every test grasp."""
+    """What a worker needs: the cell, and what is known of every test grasp.
 
-    loaded: LoadedCell
-    known: BinRoadmap
+    Attributes
+    ----------
+    fillings : tuple of LoadedCell
+        The cell for each level of the parts in the bin, in the order of the layers.
+    known : tuple of BinRoadmap
+        Of the test grasps of each.
+    body_pairs : tuple of str
+        As the map numbers them.
+    """
+
+    fillings: tuple[LoadedCell, ...]
+    known: tuple[BinRoadmap, ...]
+    body_pairs: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class _OneFilling:
+    """Stages of one filling among others, under names of their own."""
+
+    stages: Stages
+    suffix: str
+
+    def run(
+        self, phase: str, job: Job, units: Sequence[Any], *, most: int | None = None
+    ) -> list[Any]:
+        return self.stages.run(phase + self.suffix, job, units, most=most)
+
+    def once(
+        self,
+        phase: str,
+        function: Callable[[Progress], Any],
+        tally: Callable[[Any], tuple[int, int]] = one_frame,
+    ) -> Any:
+        return self.stages.once(phase + self.suffix, function, tally)
 
 
 def bin_work(scene: Scene, document: Mapping[str, Any]) -> Work:
@@ -55,36 +90,72 @@ def bin_work(scene: Scene, document: Mapping[str, Any]) -> Work:
     document : mapping
         See :func:`reachmap.scans.document.scan_document`.
     """
-    grasps = grasp_grid(scene).size
+    grasps, fillings = grasp_grid(scene).size, len(scene.loaded.fillings())
+    each = grasps // fillings
+    units = [
+        range(first + part.start, first + part.stop)
+        for first in range(0, grasps, each)
+        for part in blocks(each, GRASPS_PER_UNIT)
+    ]
     return Work(
         kind=KIND,
-        units=blocks(grasps, GRASPS_PER_UNIT),
-        job=partial(planning_job, scene),
+        units=units,
+        job=partial(planning_job, scene, tuple(document["body_pairs"])),
         settings=journal_settings(document),
-        document={**document, "grasps": grasps},
+        document={**document, "grasps": grasps, "fillings": fillings},
         frames=grasps,
     )
 
 
-def planning_job(scene: Scene, stages: Stages) -> Job:
+def pairs_of_fillings(loaded: LoadedCell) -> list[str]:
+    """Pairs of bodies that are checked at one level of the parts or another.
+
+    Raises
+    ------
+    SceneError
+        The scan configuration cannot be taken at one of them.
+    """
+    found: dict[str, None] = {}
+    for filling in loaded.fillings():
+        scene = Scene.shared(filling, with_bin=True)
+        scene.require_free_scan_configuration()
+        found |= dict.fromkeys(scene.checker.body_pairs)
+    return list(found)
+
+
+def planning_job(scene: Scene, body_pairs: tuple[str, ...], stages: Stages) -> Job:
     """Survey the test grasps and connect them; what is left is to plan to each."""
-    whole = BinContext(loaded=scene.loaded, known=connected_grasps(scene, stages))
-    return Job(function=plan_unit, prepare=prepare, context=whole, tally=tally)
-
-
-def prepare(context: BinContext) -> tuple[BinContext, Scene]:
-    """Build the scene, once per worker."""
-    return context, Scene.shared(context.loaded, with_bin=True)
-
-
-def plan_unit(state: tuple[BinContext, Scene], grasps: range) -> dict[str, Any]:
-    """Make all attempts at the test grasps of one unit; the first tells evidence."""
-    context, scene = state
-    payload = dataclasses.asdict(
-        GraspResults.join(plan_grasps(scene, context.known, grasps))
+    fillings = scene.loaded.fillings()
+    known = tuple(
+        connected_grasps(
+            Scene.shared(filling, with_bin=True),
+            stages if len(fillings) == 1 else _OneFilling(stages, f"_fill_{k}"),
+        )
+        for k, filling in enumerate(fillings)
     )
-    if grasps.start == 0:
-        payload["components"] = dataclasses.asdict(context.known.components)
+    whole = BinContext(fillings=fillings, known=known, body_pairs=body_pairs)
+    return Job(function=plan_unit, context=whole, tally=tally)
+
+
+def plan_unit(context: BinContext, grasps: range) -> dict[str, Any]:
+    """Make all attempts at the test grasps of one unit.
+
+    The first unit of a filling tells the evidence of its roadmap.
+    """
+    each = len(context.known[0].component)
+    layer, first = divmod(grasps.start, each)
+    scene = Scene.shared(context.fillings[layer], with_bin=True)
+    known = context.known[layer]
+    results = plan_grasps(scene, known, range(first, first + len(grasps)))
+    number = {name: k for k, name in enumerate(context.body_pairs)}
+    payload = dataclasses.asdict(
+        GraspResults.join(results).renumbered(
+            np.array([number[name] for name in scene.checker.body_pairs], np.int64),
+            sum(len(other.components.checks) for other in context.known[:layer]),
+        )
+    )
+    if first == 0:
+        payload["components"] = dataclasses.asdict(known.components)
     return payload
 
 
@@ -212,7 +283,8 @@ def blank(document: Mapping[str, Any], unit: int, status: Status) -> dict[str, A
     spec = Cell.model_validate_json(
         document["provenance"]["cell_resolved_json"]
     ).bin_scan
-    left = document["grasps"] - unit * GRASPS_PER_UNIT
+    each = document["grasps"] // document.get("fillings", 1)
+    left = each - unit % -(-each // GRASPS_PER_UNIT) * GRASPS_PER_UNIT
     empty = GraspResults.blank(
         min(GRASPS_PER_UNIT, left), spec.repeats, len(document["joint_names"]), status
     )
@@ -224,15 +296,19 @@ def assemble(
 ) -> BinMap:
     """Make the map from the payloads of all units."""
     parts: list[GraspResults] = []
-    components = None
+    evidence: list[Components] = []
     for payload in payloads:
         fields = dict(payload)
-        evidence = fields.pop("components", None)
-        if evidence is not None:
-            components = components_from_payload(evidence)
+        components = fields.pop("components", None)
+        if components is not None:
+            evidence.append(components_from_payload(components))
         parts.append(GraspResults(**fields))
+    complete = len(evidence) == document.get("fillings", 1)
     return assemble_bin_map(
-        document, GraspResults.join(parts), run=run, components=components
+        document,
+        GraspResults.join(parts),
+        run=run,
+        components=join_components(evidence) if complete else None,
     )
 
 

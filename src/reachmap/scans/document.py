@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from reachmap.core.scene import Scene
@@ -32,6 +32,7 @@ def scan_document(
     method: str,
     settings: Mapping[str, Any],
     source_sha256: str = "",
+    body_pairs: Sequence[str] | None = None,
 ) -> dict[str, Any]:
     """Everything an artefact holds besides the results, as JSON values.
 
@@ -45,6 +46,8 @@ def scan_document(
         What the result depends on besides the cell and its seed.
     source_sha256 : str
         ``content_sha256`` of the artefact this one is made from.
+    body_pairs : sequence of str, optional
+        As the results number them; default: as the scene does.
     """
     loaded = scene.loaded
     seed = loaded.cell.seed
@@ -69,7 +72,9 @@ def scan_document(
         "stamp": dataclasses.asdict(stamp),
         "scan_configuration": scene.scan_configuration.tolist(),
         "joint_names": list(scene.robot.joint_names),
-        "body_pairs": list(scene.checker.body_pairs),
+        "body_pairs": list(
+            scene.checker.body_pairs if body_pairs is None else body_pairs
+        ),
     }
 
 

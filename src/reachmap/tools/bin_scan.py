@@ -15,7 +15,7 @@ from reachmap.maps import BinMap, Status, read_placement, read_workspace_map
 from reachmap.runtime.options import IN_PROCESS, RunOptions
 from reachmap.runtime.run import run_scan
 from reachmap.scans.bin_roadmap import grasp_grid, roadmap_of
-from reachmap.scans.bin_scan import bin_work, plan_grasps
+from reachmap.scans.bin_scan import bin_work, pairs_of_fillings, plan_grasps
 from reachmap.scans.document import checking_settings, scan_document
 from reachmap.scans.ik_survey import survey_frames
 from reachmap.tools.options import cell_of_artefact, warn_of_nothing, with_seed
@@ -79,6 +79,7 @@ def bin_scan(
     scene.require_free_scan_configuration()
     document = scan_document(
         scene,
+        body_pairs=pairs_of_fillings(loaded),
         kind="bin_map",
         method="planned",
         settings=_settings(scene),
@@ -137,7 +138,9 @@ def estimate_bin_scan(
     loaded, _ = load_placed_cell(placement, cell, with_seed(overrides, seed), workspace)
     scene = Scene.shared(loaded, with_bin=True)
     scene.require_free_scan_configuration()
-    grid = grasp_grid(scene)
+    grid, fillings = grasp_grid(scene), loaded.fillings()
+    if len(fillings) > 1:  # the middle one stands for all
+        scene = Scene.shared(fillings[len(fillings) // 2], with_bin=True)
     rows = np.random.default_rng(0).permutation(grid.size)[:SAMPLE_GRASPS]
     begin = time.perf_counter()
     survey = survey_frames(
@@ -162,5 +165,7 @@ def _settings(scene: Scene) -> dict[str, Any]:
         "tool": cell.tool.model_dump(mode="json"),
         "attempts": cell.bin_scan.attempts,
         "repeats": cell.bin_scan.repeats,
+        "fill_m": list(cell.bin_scan.layers) if cell.bin_scan.is_filled else None,
+        "press_in_m": cell.bin_scan.press_in_m if cell.bin_scan.is_filled else None,
         "approach_distance_m": cell.bin_scan.approach_distance_m,
     }

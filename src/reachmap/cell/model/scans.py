@@ -84,6 +84,10 @@ class WorkspaceScanSpec(Record):
 
 
 Height = Annotated[Coordinate, Field(ge=0)]
+Share = Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)]
+# Stroke of a bellows cup. Tilted by 30°, a tube of 10 mm radius dips 5 mm below its
+# tip, and the safety margin is 2 mm as a rule.
+PRESS_IN_M = 0.01
 
 
 class BinScanSpec(Record):
@@ -96,7 +100,25 @@ class BinScanSpec(Record):
         (0.05,),
         min_length=1,
         max_length=64,
-        description="Heights above the bottom [m].",
+        description="Heights above the bottom [m]; written out where fill gives them.",
+    )
+    fill: tuple[Share, ...] | None = Field(
+        None,
+        min_length=1,
+        max_length=64,
+        description="Levels of the parts in the bin, as shares of its depth, in place "
+        "of layers. Grasps of a level lie on it, and what is below is an obstacle.",
+    )
+    fill_heights_m: tuple[Height, ...] | None = Field(
+        None,
+        min_length=1,
+        max_length=64,
+        description="The same as heights above the bottom [m].",
+    )
+    press_in_m: Height = Field(
+        PRESS_IN_M,
+        description="The obstacle ends this far below its level: what a cup may press "
+        "in, and a tilted tool may dip below its tip [m].",
     )
     orientations: OrientationFamily = Field(
         ConeFamily(), description="Tool orientations tried at every point."
@@ -112,6 +134,17 @@ class BinScanSpec(Record):
     approach_distance_m: Height = Field(
         0.0, description="Straight approach before the grasp [m]; 0 plans to the pose."
     )
+
+    @property
+    def is_filled(self) -> bool:
+        """Whether each layer is the surface of parts that fill the bin below it."""
+        return self.fill is not None or self.fill_heights_m is not None
+
+    def heap_m(self, layer: int) -> float:
+        """Height of the obstacle below a layer [m]."""
+        if not self.is_filled:
+            return 0.0
+        return max(round(self.layers[layer] - self.press_in_m, 9), 0.0)
 
     def count(self) -> int:
         """Count the test grasps."""

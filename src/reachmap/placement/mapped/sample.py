@@ -82,20 +82,33 @@ def frames_in_bin(cell: Cell) -> FrameGrid:
         points=(in_base.points - p_base_bin) @ R_base_bin,
         orientations=R_base_bin.T @ in_base.orientations,
     )
-    count = len(frames.points)
-    if count <= MAX_LAYERS:
-        return frames
-    points = frames.points[[0, count // 2, count - 1]]
+    points = frames.points[kept_layers(len(frames.points))]
     return FrameGrid(points=points, orientations=frames.orientations)
+
+
+def kept_layers(count: int) -> list[int]:
+    """Layers that placement looks at: of many the lowest, middle and highest."""
+    return list(range(count)) if count <= MAX_LAYERS else [0, count // 2, count - 1]
 
 
 def open_frames(robot: RobotModel, loaded: LoadedCell) -> BoolArray:
     """Which of :func:`frames_in_bin` the tool can take without touching the bin.
 
-    The others are lost wherever the bin stands and whatever the arm does.
+    The others are lost wherever the bin stands and whatever the arm does. Parts that
+    fill the bin are in the way of the tool as its walls are.
     """
-    frames = frames_in_bin(loaded.cell)
-    blocked = ToolFit(robot, loaded).blocked(frames.transforms().reshape(-1, 4, 4))
+    frames, cell = frames_in_bin(loaded.cell), loaded.cell
+    T = frames.transforms()
+    layers = kept_layers(len(cell.bin_scan.layers))
+    if not cell.bin_scan.is_filled:
+        blocked = ToolFit(robot, loaded).blocked(T.reshape(-1, 4, 4))
+    else:
+        blocked = np.concatenate(
+            [
+                ToolFit(robot, loaded.filled_to(layer)).blocked(rows.reshape(-1, 4, 4))
+                for layer, rows in zip(layers, T, strict=True)
+            ]
+        )
     return np.asarray(~blocked.reshape(frames.shape))
 
 
