@@ -13,6 +13,7 @@ from reachmap.maps.format.placement import is_turn
 from reachmap.maps.records import Status
 from reachmap.maps.summary.bin import MEASURES, BinSummary, Spread
 from reachmap.maps.summary.directions import ReachedShares
+from reachmap.maps.summary.emptying import Emptying
 from reachmap.maps.summary.evidence import EvidenceSummary
 from reachmap.maps.summary.placement import CandidateSummary, PlacementSummary
 from reachmap.maps.summary.reliability import Reliability
@@ -162,6 +163,7 @@ def _bin_lines(summary: BinSummary) -> list[str]:
         "",
         "Path reachability",
         *share_lines(summary.shares),
+        *_emptying_lines(summary.emptying),
         "",
         "Reached after n attempts (Wilson interval)",
         *table_lines(rows, ">>>>>"),
@@ -192,6 +194,33 @@ def share_lines(shares: ReachedShares) -> list[str]:
     return table_lines(
         [[name, f"{percent_text(share)} %", said] for name, share, said in rows], "<><"
     )
+
+
+def _emptying_lines(emptying: Emptying | None) -> list[str]:
+    """Reachability by height, from the top down as a bin is emptied."""
+    if emptying is None:
+        return []
+    rows = [["height [mm]", "fill %", "points %", "directions %", "frames %"]]
+    with_cycle = emptying.levels[0].cycle is not None
+    if with_cycle:
+        rows[0].append("cycle %")
+    for level in reversed(emptying.levels):
+        values = [level.points, level.directions, level.frames]
+        if level.cycle is not None:
+            values.append(level.cycle)
+        rows.append(
+            [
+                f"{1000.0 * level.height_m:.0f}",
+                f"{100.0 * level.fill:.0f}",
+                *(percent_text(value) for value in values),
+            ]
+        )
+    below = "" if emptying.filled else " (parts below a layer are no obstacle)"
+    return [
+        "",
+        f"Emptying: {emptying.sentence}{below}",
+        *table_lines(rows, ">" * len(rows[0])),
+    ]
 
 
 def _unreached_lines(evidence: EvidenceSummary | None) -> list[str]:

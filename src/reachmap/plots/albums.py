@@ -12,6 +12,7 @@ import numpy as np
 from reachmap._typing import FloatArray
 from reachmap.errors import SettingsError
 from reachmap.maps.records import BinMap, BinPlacement, WorkspaceMap
+from reachmap.maps.summary.emptying import emptying_of
 from reachmap.maps.summary.statistics import are_independent
 from reachmap.plots.approach import draw_approach
 from reachmap.plots.bin_map import (
@@ -22,6 +23,7 @@ from reachmap.plots.bin_map import (
 )
 from reachmap.plots.causes import draw_causes
 from reachmap.plots.comparison import MapChange, draw_change_sheet, draw_comparison
+from reachmap.plots.emptying import draw_emptying
 from reachmap.plots.heatmap import draw_level
 from reachmap.plots.overview import draw_overview
 from reachmap.plots.parts.bin_view import percent_after
@@ -190,6 +192,15 @@ def bin_album(
                 name="bin_saturation",
                 title="Test grasps reached over the number of attempts",
                 draw=partial(draw_saturation, bin_map),
+            )
+        )
+    emptying = emptying_of(bin_map)
+    if emptying is not None:
+        items.append(
+            Picture(
+                name="bin_emptying",
+                title=f"Emptying: {emptying.sentence}",
+                draw=partial(draw_emptying, bin_map, emptying),
             )
         )
     return [*items, _causes_picture(bin_map, "bin_causes")]

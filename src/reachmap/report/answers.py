@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from reachmap.maps.summary.directions import reached_shares
+from reachmap.maps.summary.emptying import emptying_of
 from reachmap.maps.summary.placement import summarise_placement
 from reachmap.maps.summary.statistics import (
     are_independent,
@@ -21,8 +22,9 @@ FIRST_PICKS = 3
 
 
 def headline_answers(run: RunFolder) -> list[Tile]:
-    """Tiles: best level, bin, share of test grasps, first picks."""
-    return [_level(run), _bin(run), _share(run), _picks(run)]
+    """Tiles: best level, bin, share of test grasps, emptying, first picks."""
+    tiles = [_level(run), _bin(run), _share(run), _emptying(run), _picks(run)]
+    return [tile for tile in tiles if tile is not None]
 
 
 def _tile(question: str, reply: str, *why: str) -> Tile:
@@ -97,6 +99,24 @@ def _share(run: RunFolder) -> Tile:
         f"After one attempt: {percent(float(found.share[0]))}."
         if are_independent(run.bin_map)
         else "",
+    )
+
+
+def _emptying(run: RunFolder) -> Tile | None:
+    """Only where the bin was scanned at several levels of filling."""
+    found = None if run.bin_map is None else emptying_of(run.bin_map)
+    if found is None or not found.filled:
+        return None
+    points = ", ".join(
+        f"{percent(level.points)} at {number(1000 * level.height_m, 0, 'mm')}"
+        for level in reversed(found.levels)
+    )
+    sentence = found.sentence
+    return _tile(
+        "Will it empty the bin, and what stays behind?",
+        f"{number(found.left, 0 if found.left >= 1 else 1)} % stay",
+        f"{sentence[0].upper()}{sentence[1:]}.",
+        f"Points that can be picked by the height of the parts: {points}.",
     )
 
 

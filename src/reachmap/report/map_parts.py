@@ -21,6 +21,7 @@ from reachmap.plots.bin_map import (
     draw_directions,
     draw_reachability,
 )
+from reachmap.plots.emptying import draw_emptying
 from reachmap.plots.heatmap import draw_level
 from reachmap.plots.overview import draw_overview
 from reachmap.plots.parts.levels import level_names
@@ -225,12 +226,23 @@ def bin_section(record: BinMap) -> Section:
             f"{count(summary.repeats, 'attempt')} at each: {summary.reachable} reached."
         ),
         _quadrant_table(summary),
+        _emptying(record, summary),
         pictures,
         _shares_paragraph(summary),
         _saturation(record),
         _evidence_paragraph(summary.unreached),
         Heading("What a pick takes"),
         _measure_table(summary),
+    )
+
+
+def _emptying(record: BinMap, summary: BinSummary) -> Blocks:
+    if summary.emptying is None:
+        return None
+    return drawn(
+        draw_emptying(record, summary.emptying),
+        f"Emptying by height of the parts: {summary.emptying.sentence}.",
+        record,
     )
 
 

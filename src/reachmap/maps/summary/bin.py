@@ -9,6 +9,7 @@ import numpy as np
 from reachmap._typing import BoolArray, FloatArray
 from reachmap.maps.records import BinMap, Status
 from reachmap.maps.summary.directions import ReachedShares, reached_shares
+from reachmap.maps.summary.emptying import Emptying, emptying_of
 from reachmap.maps.summary.evidence import EvidenceSummary, evidence_of
 from reachmap.maps.summary.reliability import Reliability, term_reliability
 from reachmap.maps.summary.statistics import (
@@ -127,6 +128,8 @@ class BinSummary:
         By what J is made of, see :func:`term_reliability`.
     unreached : EvidenceSummary or None
         Behind ``no_path_found``; None where the map does not tell.
+    emptying : Emptying or None
+        Reachability by height; None with a single layer.
     """
 
     grasps: int
@@ -143,6 +146,7 @@ class BinSummary:
     shares: ReachedShares
     reliability: dict[str, Reliability]
     unreached: EvidenceSummary | None
+    emptying: Emptying | None
 
 
 def summarise_bin(record: BinMap) -> BinSummary:
@@ -162,6 +166,7 @@ def summarise_bin(record: BinMap) -> BinSummary:
         shares=reached_shares(record),
         reliability=term_reliability(record),
         unreached=_unreached(record),
+        emptying=emptying_of(record),
     )
 
 
