@@ -246,8 +246,8 @@ def engine_versions() -> dict[str, str]:
 
 _states: OrderedDict[str, tuple[Job, Any]] = OrderedDict()
 # One unit at a time per process: models and scenes are not made for threads, which
-# a Dask worker may have several of.
-_busy = threading.Lock()
+# a Dask worker may have several of. A unit of a study may have units of its own.
+_busy = threading.RLock()
 
 
 def get_ready(ticket: Ticket) -> None:
