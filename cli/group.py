@@ -72,6 +72,7 @@ COMMANDS: dict[str, Entry] = {
             "view": "Look at a cell or an artefact in 3D, in the browser.",
             "report": "Write a run as one self-contained page.",
             "compare": "Compare two maps of the same kind, frame by frame.",
+            "study": "Map variants of a cell, and say which change is more than noise.",
             "validate": "Test a bin map against real planning to real grasps.",
         },
     ),

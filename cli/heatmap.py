@@ -63,7 +63,8 @@ def command(artefact: Path, **settings: Any) -> None:
     of all levels together, a bin map its reachability after one and after all
     attempts, the saturation, the costs and the approach directions; both show why test
     frames are not reached. A placement gives the bin on its level, the runner-up and
-    the places that were considered. The names of the files are printed.
+    the places that were considered. A study gives its main effects and, for two
+    parameters, their grid. The names of the files are printed.
 
     Example: reachmap heatmap workspace.h5 --quantity all -o heatmaps
     """

@@ -19,7 +19,8 @@ def command(artefact: Path, as_json: bool) -> None:
     A workspace map: reachability level by level with its counts, why frames are not
     reached and which bodies are in the way, how many planning attempts it rests on. A
     bin map: reachability after one attempt, two, … with intervals, causes, quadrants,
-    lengths and times. A placement: pose, score, margin, runner-up. All: the cell,
+    lengths and times. A placement: pose, score, margin, runner-up. A study: variants,
+    main effects, the best. All: the cell,
     settings and run behind it. A journal is summed up as far as it goes.
 
     Example: reachmap info bin.h5

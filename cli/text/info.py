@@ -7,6 +7,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from reachmap.cli.text.study import study_lines
 from reachmap.cli.text.tables import fact_lines, table_lines
 from reachmap.maps.bytes.to_json import flat_json
 from reachmap.maps.format.placement import is_turn
@@ -23,6 +24,7 @@ from reachmap.maps.summary.statistics import (
     Saturation,
     ik_approximation,
 )
+from reachmap.maps.summary.study import StudySummary
 from reachmap.maps.summary.workspace import LevelSummary, WorkspaceSummary
 from reachmap.plots.parts.levels import level_names
 from reachmap.text import count_text, percent_text, plural
@@ -39,6 +41,8 @@ def info_text(info: ArtefactInfo) -> str:
         body = _workspace_lines(summary)
     elif isinstance(summary, BinSummary):
         body = _bin_lines(summary)
+    elif isinstance(summary, StudySummary):
+        body = study_lines(summary)
     else:
         body = _placement_lines(summary)
     lines = [_headline(info), *_approximation_lines(info), *body, "", "Made from"]

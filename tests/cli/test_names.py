@@ -25,6 +25,7 @@ OUTPUTS = {
     "heatmap": ("workspace.h5",),
     "place-bin": ("workspace.h5",),
     "bin-scan": ("--cell", "planar-toy"),
+    "study": ("planar-toy", "--vary", "seed=1,2"),
     "rank": ("grasps.json", "--map", "bin.h5"),
     "merge": ("some.journal",),
 }
@@ -68,6 +69,7 @@ def test_an_input_that_is_no_file(command: str, name: str, here: Path) -> None:
     more = dict.fromkeys(("merge", "workspace-scan", "bin-scan"), new)
     more["validate"] = ("grasps.json",)
     more["export"] = ("--all",)
+    more["study"] = ("--vary", "seed=1,2")
     arguments = (name, *more.get(command, ()))
     if command == "compare":
         arguments = (name, "bin.h5")

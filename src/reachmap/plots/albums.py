@@ -12,6 +12,7 @@ import numpy as np
 from reachmap._typing import FloatArray
 from reachmap.errors import SettingsError
 from reachmap.maps.records import BinMap, BinPlacement, WorkspaceMap
+from reachmap.maps.study.record import Study
 from reachmap.maps.summary.emptying import emptying_of
 from reachmap.maps.summary.statistics import are_independent
 from reachmap.plots.approach import draw_approach
@@ -34,6 +35,7 @@ from reachmap.plots.parts.stack import LevelStack, level_title, stack_of
 from reachmap.plots.parts.style import PercentMap
 from reachmap.plots.placement import draw_placement, placement_words
 from reachmap.plots.saturation import draw_saturation
+from reachmap.plots.study import draw_grid, draw_main_effects
 
 # How close a height must be to a level to mean it [m].
 LEVEL_TOLERANCE = 1e-3
@@ -280,3 +282,19 @@ def _candidate_table(placement: BinPlacement) -> str:
             ]
         )
     return stream.getvalue()
+
+
+def study_album(
+    study: Study, *, percent_map: PercentMap = "RdYlGn"
+) -> list[Picture | Table]:
+    """List the pictures of a study: main effects, and the grid of two parameters."""
+    items: list[Picture | Table] = []
+    is_table = study.design == "grid" and len(study.parameter_names) == 2
+    for k, name in enumerate(study.objective_names):
+        effects = partial(draw_main_effects, study, k)
+        title = f"Main effects on {name}"
+        items.append(Picture(name=f"effects_{name}", title=title, draw=effects))
+        if is_table:
+            draw = partial(draw_grid, study, k, percent_map)
+            items.append(Picture(name=f"grid_{name}", title=name, draw=draw))
+    return items

@@ -29,6 +29,7 @@ if TYPE_CHECKING:  # workers import this module, and have no use for HDF5
 KINDS: dict[str, str] = {
     "workspace_map": "reachmap.scans.workspace_per_frame:KIND",
     "bin_map": "reachmap.scans.bin_scan:KIND",
+    "study": "reachmap.studies.assembly:KIND",
 }
 """Kind of scan to ``module:name`` of its :class:`Kind`; imported on use."""
 ENGINES = ("numpy", "scipy", "pin", "coal", "ompl", "eaik")
@@ -275,6 +276,8 @@ def compute(ticket: Ticket, index: int, unit: Any) -> Reply:
                 raise
             text = encode(traceback.format_exc()[-MAX_TRACEBACK:])
             ok, frames, failed = 0, 0, True
+        # Units of its own may have pushed this job out.
+        _states.setdefault(ticket.key, (job, state))
         measure = Measure(
             ok=ok,
             frames=frames,

@@ -7,16 +7,17 @@ from pathlib import Path
 from reachmap.disk import is_there
 from reachmap.errors import MapFileError
 from reachmap.maps.format.registry import Artefact, read_artefact
+from reachmap.maps.study.record import Study
 from reachmap.runtime.journal import is_store
 from reachmap.runtime.store import store_path
 
 
-def read_artefact_or_journal(path: Path) -> tuple[Artefact, bool]:
+def read_artefact_or_journal(path: Path) -> tuple[Artefact | Study, bool]:
     """Read an artefact, or what a journal holds so far.
 
     Returns
     -------
-    record : WorkspaceMap, BinMap or BinPlacement
+    record : WorkspaceMap, BinMap, BinPlacement or Study
     finished : bool
         Whether it was an artefact.
 

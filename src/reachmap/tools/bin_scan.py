@@ -12,6 +12,7 @@ import numpy as np
 from reachmap.cell.loading import read_cell
 from reachmap.core.scene import Scene
 from reachmap.maps import BinMap, Status, read_placement, read_workspace_map
+from reachmap.runtime.job import Work
 from reachmap.runtime.options import IN_PROCESS, RunOptions
 from reachmap.runtime.run import run_scan
 from reachmap.scans.bin_roadmap import grasp_grid, roadmap_of
@@ -75,6 +76,26 @@ def bin_scan(
         placement, cell, with_seed(overrides, seed), workspace
     )
     refuse_cell_files([output], loaded)
+    work = bin_scan_work(loaded, source)
+    outcome = run_scan(work, output=output, options=run, label="bin-scan")
+    warn_of_nothing(outcome.artefact, output)
+    return outcome.artefact  # type: ignore[no-any-return]
+
+
+def bin_scan_work(loaded: LoadedCell, source_sha256: str = "") -> Work:
+    """Work of a bin scan.
+
+    Parameters
+    ----------
+    loaded : LoadedCell
+    source_sha256 : str
+        Content hash of the artefact that the cell is from, "" for none.
+
+    Raises
+    ------
+    SceneError
+        The cell cannot work.
+    """
     scene = Scene.shared(loaded, with_bin=True)
     scene.require_free_scan_configuration()
     document = scan_document(
@@ -83,13 +104,9 @@ def bin_scan(
         kind="bin_map",
         method="planned",
         settings=_settings(scene),
-        source_sha256=source,
+        source_sha256=source_sha256,
     )
-    outcome = run_scan(
-        bin_work(scene, document), output=output, options=run, label="bin-scan"
-    )
-    warn_of_nothing(outcome.artefact, output)
-    return outcome.artefact  # type: ignore[no-any-return]
+    return bin_work(scene, document)
 
 
 def load_placed_cell(

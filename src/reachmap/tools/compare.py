@@ -12,7 +12,7 @@ from reachmap.maps.bytes.to_json import json_ready
 from reachmap.maps.comparison.comparison import Comparison, SquareChange, compare_maps
 from reachmap.maps.comparison.pose_matching import TOLERANCE_DEG, TOLERANCE_M, Frame
 from reachmap.maps.format.registry import kind_of
-from reachmap.maps.records import BinMap, BinPlacement, WorkspaceMap
+from reachmap.maps.records import BinMap, WorkspaceMap
 from reachmap.tools.artefacts import read_artefact_or_journal
 
 if TYPE_CHECKING:
@@ -105,13 +105,8 @@ def compare(
     SettingsError
         The maps are of different kinds or have no pose in common.
     """
-    a, b = (read_artefact_or_journal(path)[0] for path in (before, after))
+    a, b = _read_map(before), _read_map(after)
     kinds = [kind_of(record).replace("_", " ") for record in (a, b)]
-    if isinstance(a, BinPlacement) or isinstance(b, BinPlacement):
-        found = before if isinstance(a, BinPlacement) else after
-        raise SettingsError(
-            f"{found}: a bin placement; compare takes workspace maps or bin maps"
-        )
     if kinds[0] != kinds[1]:
         raise SettingsError(
             f"{before} is a {kinds[0]}, {after} a {kinds[1]}; "
@@ -121,6 +116,15 @@ def compare(
         a, b, frame=frame, tolerance_m=tolerance_m, tolerance_deg=tolerance_deg
     )
     return MapComparison(paths=(before, after), before=a, after=b, result=result)
+
+
+def _read_map(path: Path) -> WorkspaceMap | BinMap:
+    record, _ = read_artefact_or_journal(path)
+    if not isinstance(record, WorkspaceMap | BinMap):
+        kind = kind_of(record).replace("_", " ")
+        text = "compare takes workspace maps or bin maps"
+        raise SettingsError(f"{path}: a {kind}; {text}")
+    return record
 
 
 def draw(

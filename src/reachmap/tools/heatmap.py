@@ -15,7 +15,14 @@ from reachmap.maps import (
     read_workspace_map,
 )
 from reachmap.maps.records import BinMap, BinPlacement, WorkspaceMap
-from reachmap.plots.albums import bin_album, placement_album, workspace_album
+from reachmap.maps.study.format import read_study
+from reachmap.maps.study.record import Study
+from reachmap.plots.albums import (
+    bin_album,
+    placement_album,
+    study_album,
+    workspace_album,
+)
 from reachmap.plots.parts.files import Picture, Table, write_all
 from reachmap.plots.parts.levels import QUANTITIES, Quantity
 from reachmap.plots.parts.style import Format, PercentMap
@@ -38,7 +45,7 @@ def heatmap(
     tables: bool = False,
     overwrite: bool = False,
 ) -> tuple[Path, ...]:
-    """Draw a workspace map, a bin map or a placement.
+    """Draw a workspace map, a bin map, a placement or a study.
 
     Parameters
     ----------
@@ -66,14 +73,14 @@ def heatmap(
         The files written.
     """
     found = artefact_kind(artefact)
-    if found in ("bin_map", "bin_placement") and (quantity or levels):
+    if found in ("bin_map", "bin_placement", "study") and (quantity or levels):
         raise SettingsError(
             f"{artefact}: --quantity and --level are for workspace maps (this is a "
             f"{found.replace('_', ' ')})"
         )
     if workspace is not None and found != "bin_placement":
         raise SettingsError(f"{artefact}: --workspace is for placements")
-    record: WorkspaceMap | BinMap | BinPlacement
+    record: WorkspaceMap | BinMap | BinPlacement | Study
     items: list[Picture | Table]
     if found == "bin_map":
         record = read_bin_map(artefact)
@@ -82,6 +89,11 @@ def heatmap(
         record = read_placement(artefact)
         below = _map_below(artefact, record, workspace)
         items = placement_album(record, below, percent_map=percent_map, tables=tables)
+    elif found == "study":
+        if tables:
+            raise SettingsError(f"{artefact}: --csv is for maps (info --json has all)")
+        record = read_study(artefact)
+        items = study_album(record, percent_map=percent_map)
     else:
         record = read_workspace_map(artefact)
         chosen = QUANTITIES if quantity == "all" else (quantity or "path",)

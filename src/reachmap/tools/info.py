@@ -11,12 +11,14 @@ from typing import Any, TypeAlias
 from reachmap.maps.bytes.to_json import json_ready
 from reachmap.maps.format.registry import Artefact, kind_of
 from reachmap.maps.records import BinMap, WorkspaceMap
+from reachmap.maps.study.record import Study
 from reachmap.maps.summary.bin import BinSummary, summarise_bin
 from reachmap.maps.summary.placement import PlacementSummary, summarise_placement
+from reachmap.maps.summary.study import StudySummary, summarise_study
 from reachmap.maps.summary.workspace import WorkspaceSummary, summarise_workspace
 from reachmap.tools.artefacts import read_artefact_or_journal
 
-Summary: TypeAlias = WorkspaceSummary | BinSummary | PlacementSummary
+Summary: TypeAlias = WorkspaceSummary | BinSummary | PlacementSummary | StudySummary
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -30,14 +32,14 @@ class ArtefactInfo:
         As in ``"bin_map"``.
     finished : bool
         False for the journal of a run that goes on or was interrupted.
-    record : WorkspaceMap, BinMap or BinPlacement
-    summary : WorkspaceSummary, BinSummary or PlacementSummary
+    record : WorkspaceMap, BinMap, BinPlacement or Study
+    summary : WorkspaceSummary, BinSummary, PlacementSummary or StudySummary
     """
 
     path: Path
     kind: str
     finished: bool
-    record: Artefact
+    record: Artefact | Study
     summary: Summary
 
     @property
@@ -87,6 +89,8 @@ def info(path: Path) -> ArtefactInfo:
         summary = summarise_workspace(record)
     elif isinstance(record, BinMap):
         summary = summarise_bin(record)
+    elif isinstance(record, Study):
+        summary = summarise_study(record)
     else:
         summary = summarise_placement(record)
     return ArtefactInfo(

@@ -10,12 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from reachmap.cell.loading import read_cell
+from reachmap.cell.loading import LoadedCell, read_cell
 from reachmap.cell.mounting import leaning_levels
 from reachmap.core.scene import Scene
 from reachmap.errors import SettingsError
 from reachmap.maps import Status, WorkspaceMap
 from reachmap.maps.summary.statistics import level_means
+from reachmap.runtime.job import Work
 from reachmap.runtime.options import IN_PROCESS, RunOptions
 from reachmap.runtime.run import run_scan
 from reachmap.sampling.frames import workspace_frames
@@ -82,18 +83,30 @@ def workspace_scan(
     leaning = leaning_levels(loaded.cell)
     if leaning:
         logger.warning("%s: %s", loaded.source, leaning)
+    work = workspace_work(loaded, method=method, with_bin=with_bin)
+    outcome = run_scan(work, output=output, options=run, label="workspace-scan")
+    warn_of_nothing(outcome.artefact, output)
+    return outcome.artefact  # type: ignore[no-any-return]
+
+
+def workspace_work(
+    loaded: LoadedCell, *, method: str = "roadmap", with_bin: bool = False
+) -> Work:
+    """Work of a workspace scan.
+
+    Raises
+    ------
+    SceneError
+        The cell cannot work.
+    """
     scene = Scene.shared(loaded, with_bin=with_bin)
     scene.require_free_scan_configuration()
     document = scan_document(
         scene, kind="workspace_map", method=method, settings=_settings(scene, method)
     )
     if method == "per-frame":
-        work = per_frame_work(loaded, document, with_bin=with_bin)
-    else:
-        work = roadmap_work(scene, document)
-    outcome = run_scan(work, output=output, options=run, label="workspace-scan")
-    warn_of_nothing(outcome.artefact, output)
-    return outcome.artefact  # type: ignore[no-any-return]
+        return per_frame_work(loaded, document, with_bin=with_bin)
+    return roadmap_work(scene, document)
 
 
 def _check_method(method: str, run: RunOptions) -> None:

@@ -7,6 +7,9 @@ from scipy import stats
 
 from reachmap._typing import BoolArray, FloatArray, IntArray
 
+Z_95 = 1.959963984540054
+"""Quantile of the standard normal distribution that leaves 2.5 % above it."""
+
 
 def mcnemar_exact(gained: int, lost: int) -> float:
     """Two-sided exact p-value of McNemar's test for paired outcomes.
@@ -21,6 +24,45 @@ def mcnemar_exact(gained: int, lost: int) -> float:
     """
     changed = gained + lost
     return float(stats.binomtest(gained, changed).pvalue) if changed else 1.0
+
+
+def paired_interval(gained: int, lost: int, pairs: int) -> tuple[float, float]:
+    """Interval at 95 % of the change of a share, from paired outcomes, as fractions.
+
+    Half a pair is added to each of the four outcomes (Agresti and Min 2005), so that
+    it has a width also where nothing changed. Holds the change itself.
+
+    Examples
+    --------
+    >>> low, high = paired_interval(0, 0, 100)
+    >>> round(low, 4), round(high, 4)
+    (-0.0192, 0.0192)
+    """
+    total = pairs + 2.0
+    a, b = (gained + 0.5) / total, (lost + 0.5) / total
+    half = Z_95 * np.sqrt((a + b - (a - b) ** 2) / total)
+    change = (gained - lost) / pairs
+    low, high = max(a - b - half, -1.0), min(a - b + half, 1.0)
+    return float(min(low, change)), float(max(high, change))
+
+
+def paired_means(difference: FloatArray) -> tuple[float, float, float, float]:
+    """Mean of paired differences, its 95 % interval, and the p-value of the t-test.
+
+    Examples
+    --------
+    >>> paired_means(np.zeros(4))
+    (0.0, 0.0, 0.0, 1.0)
+    """
+    mean, n = float(difference.mean()), len(difference)
+    if n < 2:
+        return mean, float("nan"), float("nan"), float("nan")
+    error = float(difference.std(ddof=1)) / np.sqrt(n)
+    if error == 0.0:
+        return mean, mean, mean, float(mean == 0.0)
+    half = float(stats.t.ppf(0.975, n - 1)) * error
+    p_value = 2.0 * float(stats.t.sf(abs(mean) / error, n - 1))
+    return mean, mean - half, mean + half, p_value
 
 
 def fisher_exact(

@@ -133,6 +133,7 @@ KINDS: Final[dict[str, Kind]] = {
     "workspace_map": Kind("workspace map", "reachmap workspace-scan"),
     "bin_map": Kind("bin map", "reachmap bin-scan"),
     "bin_placement": Kind("bin placement", "reachmap place-bin"),
+    "study": Kind("study", "reachmap study"),
 }
 """Every kind of artefact, also for readers that know the layout of one alone."""
 

@@ -14,17 +14,20 @@ from reachmap.maps.format.placement import PLACEMENT, placement_from_tree
 from reachmap.maps.format.store import load
 from reachmap.maps.format.workspace import WORKSPACE, workspace_map_from_tree
 from reachmap.maps.records import BinMap, BinPlacement, Provenance, WorkspaceMap
+from reachmap.maps.study.format import STUDY, study_from_tree
+from reachmap.maps.study.record import Study
 
 Artefact: TypeAlias = WorkspaceMap | BinMap | BinPlacement
 
-_RECORDS: Final[dict[str, Callable[[Tree, Path], Artefact]]] = {
+_RECORDS: Final[dict[str, Callable[[Tree, Path], Artefact | Study]]] = {
     "workspace_map": workspace_map_from_tree,
     "bin_map": bin_map_from_tree,
     "bin_placement": placement_from_tree,
+    "study": study_from_tree,
 }
 
 
-def read_artefact(path: Path) -> Artefact:
+def read_artefact(path: Path) -> Artefact | Study:
     """Read an artefact of any kind; everything about it is checked.
 
     Raises
@@ -36,15 +39,17 @@ def read_artefact(path: Path) -> Artefact:
     return _RECORDS[layout.kind](tree, path)
 
 
-def kind_of(record: Artefact) -> str:
+def kind_of(record: Artefact | Study) -> str:
     """Kind of a record, as in ``"bin_map"``."""
     if isinstance(record, WorkspaceMap):
         return "workspace_map"
+    if isinstance(record, Study):
+        return "study"
     return "bin_map" if isinstance(record, BinMap) else "bin_placement"
 
 
 LAYOUTS: Final[dict[str, Layout]] = {
-    layout.kind: layout for layout in (WORKSPACE, BIN, PLACEMENT)
+    layout.kind: layout for layout in (WORKSPACE, BIN, PLACEMENT, STUDY)
 }
 """Kind to format."""
 

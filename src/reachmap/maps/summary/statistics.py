@@ -9,11 +9,8 @@ from typing import Any
 import numpy as np
 
 from reachmap._typing import BoolArray, CodeArray, FloatArray, IntArray
+from reachmap.maps.comparison.significance import Z_95
 from reachmap.maps.records import BinMap, Status, WorkspaceMap
-
-# Quantile of the standard normal distribution that leaves 2.5 % above it.
-Z_95 = 1.959963984540054
-
 
 STATUS_NAMES: dict[Status, str] = {
     Status.PATH_FOUND: "path found",

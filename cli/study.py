@@ -1,0 +1,125 @@
+"""``reachmap study``: which change of a cell helps most, and is it more than noise."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import click
+
+from reachmap.cli.options import (
+    cell_argument,
+    check_workers,
+    executor_option,
+    json_option,
+    output_option,
+    overwrite_option,
+    progress_option,
+    restart_option,
+    seed_option,
+    set_option,
+    workers_option,
+)
+
+OBJECTIVES = (
+    "level_average",
+    "bin_reachability",
+    "directions",
+    "points",
+    "path_length_rad",
+)
+
+
+@click.command()
+@cell_argument
+@click.option(
+    "--vary",
+    multiple=True,
+    required=True,
+    metavar="NAME=VALUES",
+    help="What to vary: a parameter of the cell, or a key as --set takes it; "
+    "NAME=LOW:HIGH:N for N values at even distances, NAME=a,b,c for these. Repeatable.",
+)
+@click.option(
+    "--latin-hypercube",
+    "samples",
+    type=click.IntRange(min=2),
+    metavar="N",
+    help="N samples of the ranges (NAME=LOW:HIGH) instead of every combination.",
+)
+@click.option(
+    "--place/--keep-bin",
+    default=False,
+    show_default=True,
+    help="Place the bin anew for each variant, or keep it where the cell has it.",
+)
+@click.option(
+    "--objective",
+    "objectives",
+    type=click.Choice(OBJECTIVES),
+    multiple=True,
+    help="What variants are judged by; the first says which is best. Repeatable; by "
+    "default all.",
+)
+@click.option(
+    "--require",
+    multiple=True,
+    metavar="'NAME >= NUMBER'",
+    help="What the best variant must meet; exit with 1 if none does. Repeatable.",
+)
+@output_option("study.h5")
+@set_option
+@seed_option
+@workers_option
+@executor_option
+@restart_option
+@overwrite_option
+@progress_option
+@json_option
+def command(
+    cell: str,
+    output: Path,
+    workers: int,
+    executor: str,
+    restart: bool,
+    overwrite: bool,
+    progress: bool,
+    as_json: bool,
+    **settings: Any,
+) -> None:
+    """Map variants of a cell, and say which change is more than noise.
+
+    CELL is a shipped cell by name, or the path of a cell file. Each variant is mapped
+    with the same seed and compared frame by frame with the variant that is closest to
+    the cell as it is. A variant that cannot work is a row with its cause. Ctrl-C loses
+    nothing: the same command goes on.
+
+    Example: reachmap study ur5-eye-in-hand --vary tube_length=0.119,0.219,0.319
+    """
+    check_workers(executor)
+    from reachmap.cli.text.study import study_lines
+    from reachmap.maps.bytes.to_json import json_ready
+    from reachmap.maps.summary.study import summarise_study
+    from reachmap.runtime.options import RunOptions
+    from reachmap.tools.study import require_feasible, study
+
+    result = study(
+        cell,
+        output,
+        run=RunOptions(
+            workers=workers,
+            executor=executor,
+            restart=restart,
+            overwrite=overwrite,
+            quiet=not progress,
+        ),
+        **settings,
+    )
+    summary = summarise_study(result)
+    if as_json:
+        click.echo(json.dumps(json_ready({"output": str(output)} | asdict(summary))))
+    else:
+        click.echo("\n".join([*study_lines(summary), str(output)]))
+    require_feasible(result)

@@ -1,0 +1,156 @@
+"""From the payloads of variants to the study, as resumable runs want it."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from reachmap._typing import BoolArray, FloatArray
+from reachmap.maps.comparison.significance import benjamini_hochberg
+from reachmap.maps.records import RunInfo, Stamp, Status
+from reachmap.maps.study.format import write_study
+from reachmap.maps.study.record import LOWER_IS_BETTER, Study, VariantStatus
+from reachmap.runtime.job import Kind
+from reachmap.scans.document import provenance_from_document
+from reachmap.studies.outcomes import (
+    Change,
+    Outcomes,
+    Requirement,
+    compare_outcomes,
+    is_met,
+)
+
+VALUES = ("value", "low", "high")
+
+
+def failure(cause: str) -> dict[str, Any]:
+    """Payload of a variant that cannot be computed."""
+    return {"cause": cause, "sha256": {}, "outcomes": {}}
+
+
+def blank(document: Mapping[str, Any], unit: int, status: Status) -> dict[str, Any]:
+    """Payload of a variant that was not computed, or broke."""
+    return failure("it broke" if status == Status.ERROR else "")
+
+
+def tally(payload: Mapping[str, Any]) -> tuple[int, int]:
+    """Variants that were computed, of one."""
+    return int(not payload["cause"]), 1
+
+
+def assemble(
+    document: Mapping[str, Any], payloads: Sequence[Any], *, run: RunInfo
+) -> Study:
+    """Make the study; units are variants that differ, rows are all of them."""
+    rows = document["rows"]
+    names = tuple(document["objectives"])
+    found = [
+        failure(row["cause"]) if row["unit"] is None else payloads[row["unit"]]
+        for row in rows
+    ]
+    outcomes = [
+        {name: Outcomes(**value) for name, value in payload["outcomes"].items()}
+        for payload in found
+    ]
+    values = _values(outcomes, names)
+    changes = _changes(outcomes, names, document["base"])
+    requirements = [Requirement(**item) for item in document["requirements"]]
+    done = np.array([bool(payload["outcomes"]) for payload in found])
+    feasible = done & np.array(
+        [
+            is_met(requirements, dict(zip(names, row, strict=True)))
+            for row in values["value"].tolist()
+        ]
+    )
+    best, runner_up = _best(names[0], values["value"][:, 0], feasible)
+    return Study(
+        design=document["design"],
+        bin_mode=document["bin_mode"],
+        base=document["base"],
+        parameter_names=tuple(document["parameter_names"]),
+        parameter_units=tuple(document["parameter_units"]),
+        objective_names=names,
+        requirements=tuple(str(item) for item in requirements),
+        best=best,
+        runner_up=runner_up,
+        parameter=np.array([row["values"] for row in rows], float),
+        assignment=tuple(row["assignment"] for row in rows),
+        status=_status(found, done),
+        cause=tuple(payload["cause"] for payload in found),
+        feasible=feasible.astype(np.uint8),
+        cell_sha256=tuple(row["cell_sha256"] for row in rows),
+        workspace_sha256=_hashes(found, "workspace"),
+        placement_sha256=_hashes(found, "placement"),
+        bin_sha256=_hashes(found, "bin"),
+        objective=values["value"],
+        objective_low=values["low"],
+        objective_high=values["high"],
+        **changes,
+        stamp=Stamp(**document["stamp"]),
+        provenance=provenance_from_document(document),
+        run=run,
+    )
+
+
+def _hashes(found: Sequence[Mapping[str, Any]], name: str) -> tuple[str, ...]:
+    return tuple(payload["sha256"].get(name, "") for payload in found)
+
+
+def _status(found: Sequence[Mapping[str, Any]], done: BoolArray) -> Any:
+    failed = np.array([bool(payload["cause"]) for payload in found])
+    status = np.where(failed, VariantStatus.FAILED, VariantStatus.NOT_ATTEMPTED)
+    return np.where(done & ~failed, VariantStatus.DONE, status).astype(np.uint8)
+
+
+def _values(
+    outcomes: Sequence[Mapping[str, Outcomes]], names: Sequence[str]
+) -> dict[str, FloatArray]:
+    return {
+        field: np.array(
+            [
+                [getattr(row[name], field) if name in row else np.nan for name in names]
+                for row in outcomes
+            ],
+            float,
+        ).reshape(len(outcomes), len(names))
+        for field in VALUES
+    }
+
+
+def _changes(
+    outcomes: Sequence[Mapping[str, Outcomes]], names: Sequence[str], base: int
+) -> dict[str, Any]:
+    """Every variant against the base, and what is more than chance among them all."""
+    nothing = Change()
+    table = [
+        [
+            compare_outcomes(name, outcomes[base][name], row[name])
+            if k != base and name in row and name in outcomes[base]
+            else nothing
+            for name in names
+        ]
+        for k, row in enumerate(outcomes)
+    ]
+    arrays = {
+        item.name: np.array([[getattr(c, item.name) for c in row] for row in table])
+        for item in dataclasses.fields(Change)
+    }
+    p_value = arrays["p_value"]
+    tested = ~np.isnan(p_value)
+    significant = np.zeros(p_value.shape, np.uint8)
+    significant[tested] = benjamini_hochberg(p_value[tested])
+    return {**arrays, "significant": significant}
+
+
+def _best(name: str, value: FloatArray, feasible: BoolArray) -> tuple[int, int]:
+    """The best of the feasible variants and the one after it, -1 for none."""
+    rows = np.flatnonzero(feasible & ~np.isnan(value))
+    sign = 1.0 if name in LOWER_IS_BETTER else -1.0
+    order = [*rows[np.argsort(sign * value[rows], kind="stable")].tolist(), -1, -1]
+    return order[0], order[1]
+
+
+KIND = Kind(name="study", blank=blank, assemble=assemble, write=write_study)

@@ -1,0 +1,233 @@
+"""What a variant is judged by: its objectives, and the outcomes that they count."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from scipy.spatial import cKDTree
+from scipy.stats import t as student
+
+from reachmap._typing import BoolArray, FloatArray
+from reachmap.maps.comparison.pose_matching import (
+    TOLERANCE_DEG,
+    TOLERANCE_M,
+    FrameTable,
+    frame_table,
+)
+from reachmap.maps.comparison.significance import (
+    mcnemar_exact,
+    paired_interval,
+    paired_means,
+)
+from reachmap.maps.records import BinMap, Status, WorkspaceMap
+from reachmap.maps.study.record import PATH_LENGTH
+from reachmap.maps.summary.directions import approach_direction
+from reachmap.maps.summary.statistics import best_level, level_means, wilson_interval
+
+NAN: Final = float("nan")
+SMALL_TURN: Final = float(np.radians(TOLERANCE_DEG))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Outcomes:
+    """Outcomes of an objective one by one, and what they come to.
+
+    Attributes
+    ----------
+    value, low, high : float
+        The objective, and its 95 % interval [percent, rad].
+    key : array, shape (n, k)
+        What the outcomes are about, one unit apart at the tolerance of poses: a pose,
+        a point with a direction, a point.
+    result : array, shape (n,)
+        1 reached, 0 not; or a length, NaN where there is none.
+    """
+
+    value: float
+    low: float
+    high: float
+    key: FloatArray
+    result: FloatArray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Change:
+    """A variant against the base; see :class:`~reachmap.maps.study.record.Study`."""
+
+    pairs: int = 0
+    gained: int = 0
+    lost: int = 0
+    change: float = NAN
+    change_low: float = NAN
+    change_high: float = NAN
+    p_value: float = NAN
+
+
+def of_workspace(record: WorkspaceMap) -> dict[str, Outcomes]:
+    """Level average: the frames of the best level, by place in the level and turn.
+
+    The best levels of two variants may differ in height; their frames are the same
+    where place in the plane and orientation are.
+    """
+    level = best_level(record.path_reachability)
+    table = frame_table(record)
+    if level is None:
+        return {}
+    value = float(level_means(record.path_reachability)[level])
+    near = np.abs(table.square[:, 2] - record.z[level]) < TOLERANCE_M
+    rows = table.rows(np.flatnonzero(near))
+    key = np.column_stack([rows.position[:, :2] / TOLERANCE_M, _turns(rows)])
+    hit = rows.status == Status.PATH_FOUND
+    return {"level_average": _share(key, hit, value)}
+
+
+def of_bin(record: BinMap) -> dict[str, Outcomes]:
+    """Reachability of frames, directions and points, and the mean path length."""
+    table = frame_table(record, "bin")
+    hit = table.status == Status.PATH_FOUND
+    place = table.position / TOLERANCE_M
+    axis = _directions(table, record.approach_axis) / SMALL_TURN
+    lengths = _path_lengths(record, table)
+    return {
+        "bin_reachability": _share(np.column_stack([place, _turns(table)]), hit),
+        "directions": _share(*_any(np.column_stack([place, axis]), hit)),
+        "points": _share(*_any(place, hit)),
+        PATH_LENGTH: _mean(np.column_stack([place, _turns(table)]), lengths),
+    }
+
+
+def _turns(table: FrameTable) -> FloatArray:
+    return np.asarray(table.rotation.reshape(-1, 9) / (np.sqrt(2.0) * SMALL_TURN))
+
+
+def _directions(table: FrameTable, approach_axis: str) -> FloatArray:
+    identity = np.array([1.0, 0.0, 0.0, 0.0])
+    return np.asarray(table.rotation @ approach_direction(identity, approach_axis))
+
+
+def _path_lengths(record: BinMap, table: FrameTable) -> FloatArray:
+    """Of the best path of each frame [rad]; the mean of attempts in old maps."""
+    if record.best is None:
+        return table.path_length
+    known = ~np.isin(record.status.ravel(), [Status.NOT_ATTEMPTED, Status.ERROR])
+    reached = record.status.ravel() == Status.PATH_FOUND
+    # The order in which frame_table lists them; a bin has no pose twice.
+    order = np.flatnonzero(known)[np.argsort(~reached[known], kind="stable")]
+    lengths = record.best.path_length.ravel()[order]
+    return lengths if len(lengths) == len(table) else table.path_length
+
+
+def _any(key: FloatArray, hit: BoolArray) -> tuple[FloatArray, BoolArray]:
+    """Join outcomes about the same thing: reached if one of them is."""
+    if not len(key):
+        return key, hit
+    # Rounding noise is far below a hundredth of the tolerance.
+    _, first, which = np.unique(
+        np.round(key, 2), axis=0, return_index=True, return_inverse=True
+    )
+    reached = np.zeros(len(first), bool)
+    np.logical_or.at(reached, which.ravel(), hit)
+    return key[first], reached
+
+
+def _share(key: FloatArray, hit: BoolArray, value: float | None = None) -> Outcomes:
+    total = len(hit)
+    if not total:
+        return Outcomes(value=NAN, low=NAN, high=NAN, key=key, result=np.zeros(0))
+    value = 100.0 * float(hit.mean()) if value is None else value
+    low, high = wilson_interval(np.array(value / 100.0 * total), np.array(float(total)))
+    return Outcomes(
+        value=value,
+        low=min(100.0 * float(low), value),
+        high=max(100.0 * float(high), value),
+        key=key,
+        result=hit.astype(float),
+    )
+
+
+def _mean(key: FloatArray, lengths: FloatArray) -> Outcomes:
+    known = lengths[~np.isnan(lengths)]
+    mean = float(known.mean()) if len(known) else NAN
+    half = NAN
+    if len(known) > 1:
+        error = float(known.std(ddof=1)) / np.sqrt(len(known))
+        half = float(student.ppf(0.975, len(known) - 1)) * error
+    return Outcomes(
+        value=mean, low=mean - half, high=mean + half, key=key, result=lengths
+    )
+
+
+def compare_outcomes(name: str, before: Outcomes, after: Outcomes) -> Change:
+    """Compare two variants on what both have an outcome of."""
+    in_a, in_b = _matches(before.key, after.key)
+    a, b = before.result[in_a], after.result[in_b]
+    if name == PATH_LENGTH:
+        both = ~np.isnan(a) & ~np.isnan(b)
+        if not both.any():
+            return Change()
+        mean, low, high, p_value = paired_means(b[both] - a[both])
+        return Change(
+            pairs=int(both.sum()),
+            change=mean,
+            change_low=low,
+            change_high=high,
+            p_value=p_value,
+        )
+    pairs = len(a)
+    if not pairs:
+        return Change()
+    gained, lost = int(((a == 0) & (b == 1)).sum()), int(((a == 1) & (b == 0)).sum())
+    low, high = paired_interval(gained, lost, pairs)
+    return Change(
+        pairs=pairs,
+        gained=gained,
+        lost=lost,
+        change=100.0 * (gained - lost) / pairs,
+        change_low=100.0 * low,
+        change_high=100.0 * high,
+        p_value=mcnemar_exact(gained, lost),
+    )
+
+
+def _matches(a: FloatArray, b: FloatArray) -> tuple[Any, Any]:
+    """Rows that are the same in both, each at most once."""
+    none = np.zeros(0, np.int64)
+    if not len(a) or not len(b) or a.shape[1] != b.shape[1]:
+        return none, none
+    _, nearest = cKDTree(b).query(a, distance_upper_bound=np.sqrt(2.0))
+    in_a = np.flatnonzero(nearest < len(b))
+    _, first = np.unique(nearest[in_a], return_index=True)
+    in_a = in_a[np.sort(first)]
+    return in_a, nearest[in_a]
+
+
+OPERATORS: Final[dict[str, Callable[[float, float], bool]]] = {
+    ">=": lambda value, bound: value >= bound,
+    "<=": lambda value, bound: value <= bound,
+    ">": lambda value, bound: value > bound,
+    "<": lambda value, bound: value < bound,
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Requirement:
+    """A bound on an objective."""
+
+    objective: str
+    operator: str
+    bound: float
+
+    def __str__(self) -> str:
+        return f"{self.objective} {self.operator} {self.bound:g}"
+
+    def holds(self, values: Mapping[str, float]) -> bool:
+        """Whether it is met; what has no value meets nothing."""
+        return OPERATORS[self.operator](values[self.objective], self.bound)
+
+
+def is_met(requirements: Sequence[Requirement], values: Mapping[str, float]) -> bool:
+    """Whether all requirements are met."""
+    return all(requirement.holds(values) for requirement in requirements)

@@ -1,0 +1,269 @@
+"""``study``: a cell and what to vary go in, a study of all variants comes out."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from reachmap.cell.loading import LoadedCell, read_cell
+from reachmap.errors import CellError, GateFailedError, SettingsError
+from reachmap.maps import Stamp, collect_provenance, config_sha256
+from reachmap.maps.study.record import OBJECTIVES, Study
+from reachmap.runtime.job import Job, Stages, Work
+from reachmap.runtime.options import IN_PROCESS, RunOptions
+from reachmap.runtime.run import run_scan
+from reachmap.scans.document import journal_settings
+from reachmap.studies.assembly import KIND, tally
+from reachmap.studies.design import (
+    Factor,
+    Variant,
+    base_of,
+    factors_of,
+    grid,
+    latin_hypercube,
+)
+from reachmap.studies.outcomes import OPERATORS, Requirement
+from reachmap.tools.options import with_seed
+from reachmap.tools.prologue import (
+    check_scan_output,
+    path_of_cell,
+    refuse_cell_files,
+)
+from reachmap.tools.variant import (
+    VariantContext,
+    VariantUnit,
+    compute_variant,
+    map_workspace,
+    needs_workspace,
+    workspace_key,
+)
+
+REQUIREMENT = re.compile(
+    r"\s*([a-z_]+)\s*(>=|<=|>|<)\s*([-+]?\d{1,9}(?:\.\d{0,9})?)\s*%?\s*"
+)
+
+
+def study(
+    cell: str,
+    output: Path,
+    *,
+    vary: Sequence[str],
+    samples: int | None = None,
+    place: bool = False,
+    objectives: Sequence[str] = (),
+    require: Sequence[str] = (),
+    overrides: Sequence[str] = (),
+    seed: int | None = None,
+    run: RunOptions = IN_PROCESS,
+) -> Study:
+    """Map variants of a cell, and compare each with the one closest to the cell.
+
+    Parameters
+    ----------
+    cell : str
+        Shipped name or path.
+    output : Path
+        The study to write.
+    vary : sequence of str
+        ``NAME=LOW:HIGH:N`` or ``NAME=a,b,c``; NAME is a parameter of the cell or a key
+        as ``--set`` takes it.
+    samples : int, optional
+        Variants of a Latin hypercube instead of every combination.
+    place : bool
+        Place the bin anew in each variant.
+    objectives : sequence of str
+        Keys of :data:`~reachmap.maps.study.record.OBJECTIVES`, all by default; the
+        first says which variant is best.
+    require : sequence of str
+        As in ``"bin_reachability >= 90"``.
+    overrides : sequence of str
+        ``key.path=value``, the same in all variants.
+    seed : int, optional
+    run : RunOptions
+
+    Raises
+    ------
+    IncompleteError
+        A variant broke; the others are in the study.
+    ReachmapError
+        See :mod:`reachmap.errors`. A variant whose cell is wrong is a row with a
+        cause, unless all are.
+    """
+    if run.shard is not None:
+        raise SettingsError("--shard: a study is shared out by its workers")
+    requirements = tuple(_requirement(text) for text in require)
+    names = _objective_names(objectives, requirements)
+    check_scan_output(output, run, [path_of_cell(cell)])
+    overrides = with_seed(overrides, seed)
+    base = read_cell(cell, overrides)
+    refuse_cell_files([output], base)
+    factors = factors_of(vary, base, sampled=samples is not None)
+    if not factors:
+        raise SettingsError("nothing to vary: give --vary NAME=LOW:HIGH:N")
+    variants = (
+        grid(factors)
+        if samples is None
+        else latin_hypercube(factors, samples, base.cell.seed)
+    )
+    rows, cells = _rows(cell, overrides, factors, variants)
+    settings = {
+        "vary": list(vary),
+        "samples": samples,
+        "bin": "placed" if place else "kept",
+        "objectives": list(names),
+        "require": [str(item) for item in requirements],
+    }
+    document = _document(base, settings) | {
+        "design": "grid" if samples is None else "latin_hypercube",
+        "bin_mode": settings["bin"],
+        "base": base_of(factors, variants, base),
+        "parameter_names": [factor.name for factor in factors],
+        "parameter_units": [factor.unit for factor in factors],
+        "objectives": list(names),
+        "requirements": [dataclasses.asdict(item) for item in requirements],
+        "rows": rows,
+    }
+    work = study_work(cells, document, names, places_bin=place)
+    outcome = run_scan(work, output=output, options=run, label="study")
+    result: Study = outcome.artefact
+    return result
+
+
+def _requirement(text: str) -> Requirement:
+    found = REQUIREMENT.fullmatch(text)
+    if found is None or found[1] not in OBJECTIVES:
+        names, signs = ", ".join(OBJECTIVES), ", ".join([*OPERATORS][1:])
+        raise SettingsError(
+            f"--require {text!r:.80}: expected 'NAME >= NUMBER' (or {signs}) with NAME "
+            f"one of {names}"
+        )
+    return Requirement(objective=found[1], operator=found[2], bound=float(found[3]))
+
+
+def _objective_names(
+    objectives: Sequence[str], requirements: Sequence[Requirement]
+) -> tuple[str, ...]:
+    for name in objectives:
+        if name not in OBJECTIVES:
+            names = ", ".join(OBJECTIVES)
+            raise SettingsError(f"--objective {name!r:.60}: expected one of {names}")
+    asked = objectives or [*OBJECTIVES]
+    return tuple(dict.fromkeys([*asked, *(item.objective for item in requirements)]))
+
+
+def _rows(
+    cell: str,
+    overrides: Sequence[str],
+    factors: Sequence[Factor],
+    variants: Sequence[Variant],
+) -> tuple[list[dict[str, Any]], list[LoadedCell]]:
+    """Rows of the study, and the cells that differ; wrong ones have a cause.
+
+    Raises
+    ------
+    CellError
+        All are wrong.
+    """
+    rows: list[dict[str, Any]] = []
+    cells: dict[str, LoadedCell] = {}
+    error: CellError | None = None
+    for variant in variants:
+        row: dict[str, Any] = {
+            "values": list(variant.values),
+            "assignment": variant.assignment(factors),
+            "unit": None,
+            "cell_sha256": "",
+            "cause": "",
+        }
+        try:
+            loaded = read_cell(cell, [*overrides, *variant.overrides])
+            cells.setdefault(loaded.sha256, loaded)
+            row |= {
+                "unit": [*cells].index(loaded.sha256),
+                "cell_sha256": loaded.sha256,
+            }
+        except CellError as found:
+            row["cause"], error = "; ".join(found.lines), found
+        rows.append(row)
+    if error is not None and not cells:
+        raise error
+    return rows, [*cells.values()]
+
+
+def _document(base: LoadedCell, settings: dict[str, Any]) -> dict[str, Any]:
+    stamp = Stamp(
+        seed=base.cell.seed,
+        cell_sha256=base.sha256,
+        config_sha256=config_sha256(
+            kind="study",
+            cell_sha256=base.sha256,
+            seed=base.cell.seed,
+            settings=settings,
+        ),
+    )
+    return {
+        "method": "study",
+        "provenance": dataclasses.asdict(collect_provenance(base, settings=settings)),
+        "stamp": dataclasses.asdict(stamp),
+    }
+
+
+def study_work(
+    cells: Sequence[LoadedCell],
+    document: dict[str, Any],
+    objectives: tuple[str, ...],
+    *,
+    places_bin: bool,
+) -> Work:
+    """Work of a study: one unit for each cell that differs from the others.
+
+    Workspace maps are made first, one for all cells that differ by their bin alone.
+    """
+    keys = [
+        workspace_key(loaded)
+        if needs_workspace(objectives, places_bin=places_bin)
+        else ""
+        for loaded in cells
+    ]
+    distinct = [*dict.fromkeys(key for key in keys if key)]
+    units = [
+        VariantUnit(loaded=loaded, workspace=distinct.index(key) if key else -1)
+        for loaded, key in zip(cells, keys, strict=True)
+    ]
+    firsts = [cells[keys.index(key)] for key in distinct]
+    return Work(
+        kind=KIND,
+        units=units,
+        job=partial(_job, firsts, objectives, places_bin),
+        settings=journal_settings(document)
+        | {"cells": [loaded.sha256 for loaded in cells]},
+        document=document,
+        frames=len(units),
+    )
+
+
+def _job(
+    firsts: Sequence[LoadedCell],
+    objectives: tuple[str, ...],
+    places_bin: bool,
+    stages: Stages,
+) -> Job:
+    workspaces = (
+        stages.run("workspaces", Job(function=map_workspace, context=None), firsts)
+        if firsts
+        else []
+    )
+    context = VariantContext(
+        objectives=objectives, places_bin=places_bin, workspaces=workspaces
+    )
+    return Job(function=compute_variant, context=context, tally=tally)
+
+
+def require_feasible(result: Study) -> None:
+    """Raise GateFailedError if requirements were made and no variant meets them."""
+    if result.requirements and not result.feasible.any():
+        raise GateFailedError(f"no variant meets {' and '.join(result.requirements)}")

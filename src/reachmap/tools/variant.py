@@ -1,0 +1,156 @@
+"""One variant of a study: a cell goes in, what it reaches comes out."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from reachmap.cell.loading import LoadedCell
+from reachmap.errors import ReachmapError
+from reachmap.maps import BinMap, RunInfo, WorkspaceMap, write_workspace_map
+from reachmap.maps.format.bin import tree_from_bin_map
+from reachmap.maps.format.workspace import tree_from_workspace_map
+from reachmap.maps.study.record import OBJECTIVES
+from reachmap.studies.assembly import failure
+from reachmap.studies.in_place import payloads_in_place
+from reachmap.studies.outcomes import Outcomes, of_bin, of_workspace
+from reachmap.tools.bin_scan import bin_scan_work, load_placed_cell
+from reachmap.tools.place_bin import place_bin
+from reachmap.tools.workspace_scan import workspace_work
+
+OF_WORKSPACE = frozenset({"level_average"})
+# A workspace map is made without the bin, whatever is to be done with it later.
+NOT_OF_WORKSPACE = ("bin", "bin_scan", "placement", "parameters", "expressions")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VariantUnit:
+    """A variant to be computed.
+
+    Attributes
+    ----------
+    loaded : LoadedCell
+    workspace : int
+        Which of the workspace maps that variants share; -1: none is needed.
+    """
+
+    loaded: LoadedCell
+    workspace: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VariantContext:
+    """What is the same for all variants.
+
+    Attributes
+    ----------
+    objectives : tuple of str
+    places_bin : bool
+        Whether place-bin decides where each variant's bin stands.
+    workspaces : sequence of dict
+        What :func:`map_workspace` found, map by map.
+    """
+
+    objectives: tuple[str, ...]
+    places_bin: bool
+    workspaces: Sequence[Mapping[str, Any]]
+
+
+def needs_workspace(objectives: Sequence[str], *, places_bin: bool) -> bool:
+    """Whether the objectives rest on a workspace map."""
+    return places_bin or not OF_WORKSPACE.isdisjoint(objectives)
+
+
+def workspace_key(loaded: LoadedCell) -> str:
+    """Equal for cells whose workspace maps have the same frames and results."""
+    data = json.loads(loaded.resolved_json)
+    for name in NOT_OF_WORKSPACE:
+        data.pop(name, None)
+    files = dict(sorted(loaded.files_sha256.items()))
+    text = json.dumps([data, loaded.urdf, loaded.srdf, files], sort_keys=True)
+    return hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()
+
+
+def map_workspace(context: Any, loaded: LoadedCell) -> dict[str, Any]:
+    """Results of the test frames of a workspace map, or why there are none."""
+    try:
+        return {"cause": "", "payloads": payloads_in_place(workspace_work(loaded))}
+    except ReachmapError as error:
+        return {"cause": _cause(error), "payloads": []}
+
+
+def compute_variant(context: VariantContext, unit: VariantUnit) -> dict[str, Any]:
+    """Map a variant; what is wrong with it is a result, too."""
+    try:
+        return _computed(context, unit)
+    except ReachmapError as error:
+        return failure(_cause(error))
+
+
+def _computed(context: VariantContext, unit: VariantUnit) -> dict[str, Any]:
+    sha256: dict[str, str] = {}
+    outcomes: dict[str, Outcomes] = {}
+    loaded, workspace = unit.loaded, None
+    if unit.workspace >= 0:
+        shared = context.workspaces[unit.workspace]
+        if shared["cause"]:
+            return failure(shared["cause"])
+        workspace = _assembled_workspace(loaded, shared["payloads"])
+        tree = tree_from_workspace_map(workspace)
+        sha256["workspace"] = str(tree.attributes["content_sha256"])
+        outcomes |= of_workspace(workspace)
+    if not OF_WORKSPACE.issuperset(context.objectives):
+        source = ""
+        if context.places_bin and workspace is not None:
+            loaded, source = _placed(workspace)
+            sha256["placement"] = source
+        bin_map = _bin_map(loaded, source)
+        sha256["bin"] = str(tree_from_bin_map(bin_map).attributes["content_sha256"])
+        outcomes |= of_bin(bin_map)
+    return {
+        "cause": "",
+        "sha256": sha256,
+        "outcomes": {
+            name: dataclasses.asdict(outcomes[name])
+            for name in OBJECTIVES
+            if name in context.objectives and name in outcomes
+        },
+    }
+
+
+def _assembled_workspace(loaded: LoadedCell, payloads: Sequence[Any]) -> WorkspaceMap:
+    """The variant's own map, of results that it shares with others."""
+    work = workspace_work(loaded)
+    record: WorkspaceMap = work.kind.assemble(work.document, payloads, run=RunInfo())
+    return record
+
+
+def _placed(workspace: WorkspaceMap) -> tuple[LoadedCell, str]:
+    """The cell with its bin placed, and the content hash of the placement."""
+    with tempfile.TemporaryDirectory(prefix="reachmap-") as folder:
+        path, output = Path(folder) / "workspace.h5", Path(folder) / "placement.h5"
+        try:
+            write_workspace_map(path, workspace)
+            place_bin(path, output)
+            return load_placed_cell(output, None, ())
+        except ReachmapError as error:
+            # The folder has another name each time; the study has not.
+            lines = [line.replace(f"{folder}/", "") for line in error.lines]
+            raise type(error)(lines) from error
+
+
+def _bin_map(loaded: LoadedCell, source_sha256: str) -> BinMap:
+    work = bin_scan_work(loaded, source_sha256)
+    payloads = payloads_in_place(work)
+    record: BinMap = work.kind.assemble(work.document, payloads, run=RunInfo())
+    return record
+
+
+def _cause(error: ReachmapError) -> str:
+    return "; ".join(error.lines)
