@@ -16,6 +16,8 @@ import numpy as np
 
 from reachmap.cell.model.cell import BinScanSpec, BinSpec, Cell, RobotSpec, TcpSpec
 from reachmap.cell.model.orientations import ConeFamily
+from reachmap.cell.text.expressions import resolve_expressions
+from reachmap.cell.text.yaml_reader import parse_yaml
 from reachmap.geometry import quaternion_wxyz_from_rotation, yaw_transform
 from reachmap.maps.format.checks import path_lengths
 from reachmap.maps.records import (
@@ -48,10 +50,9 @@ CELL = Path(__file__).parents[2] / "cells" / "ur5-eye-in-hand.yaml"
 @cache
 def cell_json() -> str:
     """The shipped cell as resolved JSON, without looking up its meshes."""
-    from ruamel.yaml import YAML
-
-    raw = YAML(typ="safe", pure=True).load(CELL.read_text(encoding="utf-8"))
-    return Cell.model_validate(raw).model_dump_json()
+    document = parse_yaml(CELL.read_text(encoding="utf-8"), str(CELL))
+    resolve_expressions(document)
+    return Cell.model_validate(document.data).model_dump_json()
 
 
 def synthetic_provenance(**changes: Any) -> Provenance:

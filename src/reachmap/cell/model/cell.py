@@ -180,9 +180,30 @@ class Cell(Record):
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 
+EXPRESSION = {"type": "string", "pattern": "^="}
+NUMBER_OR_EXPRESSION = ({"type": "number"}, EXPRESSION)
+ABOUT = ("title", "description", "default")
+
+
+def _with_expressions(schema: Any) -> Any:
+    """Let an expression of the parameters stand wherever a number may."""
+    if isinstance(schema, list):
+        return [_with_expressions(item) for item in schema]
+    if not isinstance(schema, dict):
+        return schema
+    if schema.get("type") in ("number", "integer"):
+        number = {key: value for key, value in schema.items() if key not in ABOUT}
+        about = {key: value for key, value in schema.items() if key in ABOUT}
+        return {"anyOf": [number, EXPRESSION], **about}
+    return {key: _with_expressions(item) for key, item in schema.items()}
+
+
 def cell_schema() -> dict[str, Any]:
     """JSON Schema (draft 2020-12) of a cell, generated from the model."""
-    schema = Cell.model_json_schema()
+    schema: dict[str, Any] = _with_expressions(Cell.model_json_schema())
+    named = schema["properties"]["parameters"]["patternProperties"]
+    for pattern, entry in named.items():
+        named[pattern] = {"anyOf": [entry, *NUMBER_OR_EXPRESSION]}
     head = {
         "$schema": DIALECT,
         "$id": "reachmap/cell-1.schema.json",
