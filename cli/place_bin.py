@@ -105,6 +105,14 @@ region_options = compose(
     help="Different places to map with the bin in the scene, and rows to print.",
 )
 @click.option(
+    "--tolerance",
+    nargs=2,
+    type=click.FloatRange(min=0),
+    metavar="SHIFT TURN",
+    help="Choose for the worst case while the bin is off by this [m, deg]; 0 0 for the "
+    "pose itself. Default: the cell's placement.tolerance.",
+)
+@click.option(
     "--keep-scan-configuration",
     is_flag=True,
     help="Leave the cell's own scan configuration.",
@@ -131,6 +139,7 @@ def command(
     heights: tuple[float, float] | None,
     bin_pose: tuple[float, float, float, float] | None,
     top: int,
+    tolerance: tuple[float, float] | None,
     keep_scan_configuration: bool,
     picture: Path | None,
     output: Path,
@@ -170,6 +179,7 @@ def command(
             limits=limits | ({} if heights is None else {"z": heights}),
             fixed=fixed,
             top=top,
+            tolerance=tolerance,
             keep_scan_configuration=keep_scan_configuration,
         ),
         overrides=overrides,
@@ -200,7 +210,7 @@ def _lines(placement: BinPlacement, output: Path, top: int) -> Iterator[str]:
     }
     rows = best_rows(placement, top)
     rows += [k for k in (placement.runner_up, placement.paper_choice) if k not in rows]
-    yield "      x       y       z   yaw   score   worst  reachable"
+    yield "      x       y       z   yaw           score  worst case  worst point"
     for row in rows:
         facts = row_facts(placement, row)
         if facts is not None:
@@ -208,6 +218,7 @@ def _lines(placement: BinPlacement, output: Path, top: int) -> Iterator[str]:
     facts = placement_facts(placement)
     if placement.margin:
         yield "margin (score within 5 points): " + _margin_text(facts)
+    yield from _stand(facts)
     limit = facts["tool_limit_percent"]
     if limit is not None and limit < 100:
         yield f"no pose can score more than {limit:.1f}%: the tool itself meets the bin"
@@ -218,15 +229,42 @@ def _lines(placement: BinPlacement, output: Path, top: int) -> Iterator[str]:
     yield str(output)
 
 
+def _stand(facts: dict[str, Any]) -> Iterator[str]:
+    """What the bin stands on, and what the worst case is."""
+    if facts["support"] is not None:
+        stands = facts["support"]
+        yield (
+            f"the bin stands on {stands}"
+            if stands
+            else ("the bin floats: no body of the cell is under it")
+        )
+    tolerance = facts["tolerance"]
+    if tolerance and any(tolerance.values()):
+        yield (
+            f"worst case: the bin off by {1000 * tolerance['shift_m']:.0f} mm and "
+            f"{tolerance['turn_deg']:g}°"
+        )
+
+
 def _row_text(facts: dict[str, Any], role: str) -> str:
     x, y, z = facts["xyz_m"]
     pose = f"{x:+7.3f} {y:+7.3f} {z:+7.3f} {facts['yaw_deg']:4.0f}°"
     if facts["score_percent"] is None:
         return f"{pose}  {facts.get('reason', '')}  {role}".rstrip()
     return (
-        f"{pose} {facts['score_percent']:6.1f}% {facts['worst_point_percent']:6.1f}% "
-        f"{facts['reachable_percent']:8.1f}%  {role}"
+        f"{pose} {facts['score_percent']:6.1f}{_error(facts)}% {_worst(facts)} "
+        f"{facts['worst_point_percent']:10.1f}%  {role}"
     ).rstrip()
+
+
+def _error(facts: dict[str, Any]) -> str:
+    error = facts.get("score_error_points")
+    return " " * 7 if error is None else f" ± {error:4.2f}"
+
+
+def _worst(facts: dict[str, Any]) -> str:
+    worst = facts.get("worst_case_percent")
+    return f"{'-':>11}" if worst is None else f"{worst:10.1f}%"
 
 
 def _margin_text(facts: dict[str, Any]) -> str:

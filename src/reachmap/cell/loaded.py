@@ -19,9 +19,7 @@ from reachmap.cell.files.joint_limits import MoveItLimits
 from reachmap.cell.files.resources import NotFoundError, Resolver
 from reachmap.cell.files.urdf import UrdfDescription, parse_urdf
 from reachmap.cell.model.cell import Cell, ScanConfiguration
-from reachmap.cell.model.fields import PoseSpec
 from reachmap.errors import CellError
-from reachmap.geometry import quaternion_wxyz_from_rotation
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -121,19 +119,10 @@ class LoadedCell:
         """
         cell = self.cell
         if bin_pose is not None:
-            pose = PoseSpec(
-                xyz=tuple(float(v) for v in bin_pose[:3, 3]),
-                quaternion_wxyz=tuple(
-                    float(v) for v in quaternion_wxyz_from_rotation(bin_pose[:3, :3])
-                ),
-            )
-            cell = cell.model_copy(
-                update={
-                    "bin": cell.bin.model_copy(
-                        update={"pose": pose, "frame": "robot_base"}
-                    )
-                }
-            )
+            cell = cell.with_bin_at(bin_pose, "robot_base")
+            # Where it stands now is for the pose to say.
+            free = cell.bin.model_copy(update={"on": None})
+            cell = cell.model_copy(update={"bin": free})
         if scan_configuration_rad is not None:
             q = {name: float(value) for name, value in scan_configuration_rad.items()}
             changed = ScanConfiguration(q_rad=q)

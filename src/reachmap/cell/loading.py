@@ -16,6 +16,7 @@ from reachmap.cell.model.cell import Cell
 from reachmap.cell.mounting import check_bin_stands, leaning_levels
 from reachmap.cell.references import check_names, find_doubts
 from reachmap.cell.resolution import resolved_cell, validated
+from reachmap.cell.support import stood_on_support
 from reachmap.cell.text.expressions import resolve_expressions, restore_expressions
 from reachmap.cell.text.messages import did_you_mean
 from reachmap.cell.text.overrides import apply_overrides
@@ -197,6 +198,7 @@ def cell_from_json(
     compare_hashes(document, files, files_sha256 or {})
     if changes:
         check_bin_stands(document, cell)
+        cell = stood_on_support(document, cell)
     document.raise_mistakes()
     return LoadedCell(
         cell=cell,

@@ -15,6 +15,7 @@ from reachmap.cell.files.resources import SCHEME, SHIPPED, Resolver, shipped_fol
 from reachmap.cell.model.cell import Cell
 from reachmap.cell.mounting import check_bin_stands, write_out_base_pose
 from reachmap.cell.references import moving_joints
+from reachmap.cell.support import stood_on_support
 from reachmap.cell.text.messages import add_validation_errors
 from reachmap.cell.text.yaml_reader import Document
 
@@ -72,6 +73,7 @@ def resolved_cell(
         document.raise_mistakes()
         raise
     check_bin_stands(document, resolved)
+    resolved = stood_on_support(document, resolved)
     document.raise_mistakes()
     return resolved
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -22,6 +23,7 @@ from reachmap.placement.paper_rule import LatticePoint, choose_by_paper
 from reachmap.placement.predicted.places import apart_m, rank_key
 from reachmap.placement.problem import Question
 from reachmap.placement.scan_choice import FINALISTS, ScanChoice, choose_scan
+from reachmap.placement.steadying import worst_of
 from reachmap.scans.ik_survey import survey_frames
 
 NO_ROW = -1
@@ -44,11 +46,20 @@ class Decision:
     ranked: list[int] = field(default_factory=list)
     paper: int = NO_ROW
 
-    def rank(self) -> None:
-        """Sort the rows that were mapped exactly."""
+    def rank(
+        self, preferred: Sequence[Pose] = (), unfit: Collection[Pose] = ()
+    ) -> None:
+        """Sort the rows that were mapped exactly, some poses before all others.
+
+        Poses that are unfit are left out.
+        """
         rows = self.table.rows
-        exact = [k for k, row in enumerate(rows) if row.exact]
-        self.ranked = sorted(exact, key=lambda k: rank_key(rows[k]))
+        place = {pose: k for k, pose in enumerate(preferred)}
+        exact = [k for k, r in enumerate(rows) if r.exact and r.pose not in unfit]
+        self.ranked = sorted(
+            exact,
+            key=lambda k: (place.get(rows[k].pose, len(place)), rank_key(rows[k])),
+        )
 
     def runner_up(self, pose: Pose, distance_m: float) -> int:
         """Best row in another place than a pose, or -1."""
@@ -133,7 +144,7 @@ def paper_pose(question: Question) -> Pose | None:
             )
         )
         for angle in (yaw, yaw + np.pi / 2):
-            if not question.reason_against((x, y, z, angle)):
+            if not question.reason_against((x, y, z, angle), floats=True):
                 found.append((x, y, z, angle))
                 return True
         return False
@@ -218,11 +229,12 @@ def settle(question: Question, decision: Decision) -> Outcome:
             rows[row] = Candidate(pose=rows[row].pose, exact=True, reason=UNSEEN)
             continue
         pose = rows[row].pose
+        if rows[row].worst is None and not question.tolerance.is_none:
+            worst = worst_of(question, rows[row]).score
+            rows[row] = dataclasses.replace(rows[row], worst=worst)
         chosen = row
         if scan.is_new:
-            chosen = decision.table.add(
-                dataclasses.replace(rows[row], score=scan.score)
-            )
+            chosen = decision.table.add(_from_scan(rows[row], scan))
         return Outcome(
             chosen=chosen,
             runner_up=decision.runner_up(pose, question.different_place_m),
@@ -231,6 +243,14 @@ def settle(question: Question, decision: Decision) -> Outcome:
             margin=_margins(question, pose, scan.q),
         )
     raise SceneError(f"{question.loaded.source}: {UNSEEN}; {REMEDY}")
+
+
+def _from_scan(candidate: Candidate, scan: ScanChoice) -> Candidate:
+    """A candidate as it is reached from another scan configuration."""
+    worst = candidate.worst
+    if worst is not None and candidate.score is not None:
+        worst = max(worst + scan.score.score - candidate.score.score, 0.0)
+    return dataclasses.replace(candidate, score=scan.score, worst=worst)
 
 
 def _scan(question: Question, candidate: Candidate) -> ScanChoice | None:

@@ -9,8 +9,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from reachmap._typing import BoolArray, FloatArray
+from reachmap.cell.support import (
+    SLACK_M,
+    TopFace,
+    bottom_m,
+    footprint_of_bin,
+    support_of,
+)
 from reachmap.core.collision.bin_fit import BinFit
 from reachmap.core.scene import Scene
+from reachmap.geometry import yaw_transform
 from reachmap.maps.records import WorkspaceMap
 from reachmap.placement.mapped.candidates import Candidate
 from reachmap.placement.mapped.evaluator import Evaluator
@@ -24,6 +32,7 @@ from reachmap.placement.mapped.imaging import (
 from reachmap.placement.predicted.places import best_at_each_place, pose_grid
 from reachmap.placement.predicted.prediction import field_of, footprint_of, predict
 from reachmap.placement.predicted.region import Region
+from reachmap.placement.tolerance import EXACT, Tolerance
 
 if TYPE_CHECKING:
     from reachmap.cell.loading import LoadedCell
@@ -48,6 +57,12 @@ class Question:
     still_camera : array, shape (4, 4), or None
         T_base_camera of a camera that is not on the tool: where the bin must be in its
         picture.
+    tolerance : Tolerance
+        How far the bin may be off.
+    faces : tuple of TopFace
+        What there is to stand on, in the level frame.
+    supports : tuple of TopFace
+        Those that the bin must stand on one of; it may float where there is none.
     keep_scan : bool
         Whether the cell's own scan configuration stays.
     fit : BinFit
@@ -65,6 +80,9 @@ class Question:
     fit: BinFit
     evaluator: Evaluator
     still_camera: FloatArray | None = None
+    tolerance: Tolerance = EXACT
+    faces: tuple[TopFace, ...] = ()
+    supports: tuple[TopFace, ...] = ()
 
     @property
     def different_place_m(self) -> float:
@@ -75,11 +93,15 @@ class Question:
         """The bin at a pose, in robot_base, shape (4, 4)."""
         return bin_at(self.loaded.cell, pose)
 
-    def reason_against(self, pose: Pose) -> str:
-        """Why the bin cannot stand at a pose, or ""."""
+    def reason_against(self, pose: Pose, *, floats: bool = False) -> str:
+        """Why the bin cannot stand at a pose, or ""; it may float if that is said."""
         outside = self.region.outside(np.array(pose))
         if outside:
             return f"{outside} is outside the region"
+        if self.supports and not floats:
+            overhang = self._overhang(pose)
+            if overhang:
+                return overhang
         T_base_bin = self.T_base_bin(pose)
         contact = self.fit.contact(T_base_bin)
         if contact is not None:
@@ -88,6 +110,24 @@ class Question:
             return ""
         seen = is_in_picture(self.loaded.cell, self.still_camera, T_base_bin)
         return "" if seen else OUT_OF_SIGHT
+
+    def support(self, pose: Pose) -> str:
+        """Name of the body that the bin stands on at a pose, "" where it floats."""
+        bin_spec = self.loaded.cell.bin
+        return support_of(bin_spec, yaw_transform(*pose), self.faces)
+
+    def _overhang(self, pose: Pose) -> str:
+        """Why the bin does not stand on a support at a pose, or ""."""
+        bin_spec = self.loaded.cell.bin
+        z = pose[2] - bottom_m(bin_spec)
+        under = [face for face in self.supports if abs(face.z - z) < 1e-6]
+        if not under:
+            return "the bin stands on nothing"
+        corners = footprint_of_bin(bin_spec, yaw_transform(*pose))
+        if min(face.overhang_m(corners) for face in under) <= SLACK_M:
+            return ""
+        names = " or ".join(face.name for face in under)
+        return f"the bin hangs over the edge of {names}"
 
     def can_be_imaged(self, pose: Pose) -> bool:
         """Whether some scan configuration, or the one that stays, images the bin.
@@ -127,7 +167,10 @@ class Question:
     def predicted(self) -> list[Candidate]:
         """Best pose at each place, by interpolation of the map."""
         workspace = self.workspace
-        grid = pose_grid(self.region, workspace.x, workspace.y, workspace.z)
+        heights = [face.z + bottom_m(self.loaded.cell.bin) for face in self.supports]
+        grid = pose_grid(
+            self.region, workspace.x, workspace.y, workspace.z, heights=heights
+        )
         footprint = footprint_of(self.loaded.cell, self.is_open)
         prediction = predict(field_of(workspace), footprint, grid)
         return list(best_at_each_place(prediction, self.reason_against))

@@ -16,6 +16,7 @@ from reachmap.placement.mapped.imaging import UNSEEN
 from reachmap.placement.predicted.places import apart_m, rank_key, spread_out
 from reachmap.placement.predicted.region import AXES, Region
 from reachmap.placement.problem import Question
+from reachmap.placement.steadying import steadied
 
 TURNS_DEG = (45.0, 90.0, 135.0)
 PLACES_IMPROVED = 2
@@ -48,11 +49,14 @@ def decide_by_search(question: Question, top: int) -> Decision:
     scored = sorted((c for c in mapped if c.score is not None), key=rank_key)
     better = _improved(question, scored[:PLACES_IMPROVED])
     mapped += question.exact([pose for pose in better if pose not in poses])
-    for candidate in {c.pose: c for c in mapped}.values():
+    # The paper's rule knows of no support; where its bin floats it is compared alone.
+    unfit = {paper} if paper is not None and question.reason_against(paper) else set()
+    steady = steadied(question, [c for c in mapped if c.pose not in unfit])
+    for candidate in {c.pose: c for c in [*mapped, *steady]}.values():
         row = decision.table.add(candidate)
         if candidate.pose == paper:
             decision.paper = row
-    decision.rank()
+    decision.rank([c.pose for c in steady], unfit)
     if not decision.ranked:
         raise SceneError(nowhere(question, decision.table))
     return decision

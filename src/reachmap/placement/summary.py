@@ -22,6 +22,8 @@ def placement_facts(placement: BinPlacement) -> dict[str, Any]:
     excluded = sum(1 for reason in placement.reason if reason)
     return {
         "rule": placement.rule,
+        "support": placement.support,
+        "tolerance": tolerance_facts(placement),
         "chosen": row_facts(placement, placement.chosen),
         "runner_up": row_facts(placement, placement.runner_up),
         "paper": row_facts(placement, placement.paper_choice),
@@ -48,6 +50,14 @@ def placement_facts(placement: BinPlacement) -> dict[str, Any]:
     }
 
 
+def tolerance_facts(placement: BinPlacement) -> dict[str, float] | None:
+    """Shift [m] and turn [deg] that the worst case is taken over, None before 1.1."""
+    if placement.tolerance is None:
+        return None
+    shift_m, turn_rad = placement.tolerance
+    return {"shift_m": shift_m, "turn_deg": round(float(np.degrees(turn_rad)), 4)}
+
+
 def row_facts(placement: BinPlacement, row: int) -> dict[str, Any] | None:
     """Pose and score of a candidate; None for row -1."""
     if row < 0:
@@ -61,7 +71,11 @@ def row_facts(placement: BinPlacement, row: int) -> dict[str, Any] | None:
         ("score_percent", placement.score),
         ("worst_point_percent", placement.worst_point),
         ("reachable_percent", placement.reachable_share),
+        ("worst_case_percent", placement.worst_score),
+        ("score_error_points", placement.score_error),
     ):
+        if values is None:
+            continue
         value = float(values[row])
         facts[name] = None if np.isnan(value) else round(value, 2)
     if placement.reason[row]:

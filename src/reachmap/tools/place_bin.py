@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from reachmap._typing import FloatArray
+from reachmap._typing import BoolArray, FloatArray
+from reachmap.cell.support import TopFace, top_faces
 from reachmap.core.collision.bin_fit import BinFit
 from reachmap.core.collision.camera import Camera
 from reachmap.core.scene import Scene
@@ -35,7 +36,7 @@ from reachmap.placement.decision import (
     refuse_nothing,
     settle,
 )
-from reachmap.placement.mapped.evaluator import open_evaluator
+from reachmap.placement.mapped.evaluator import Evaluator, open_evaluator
 from reachmap.placement.mapped.exact import Pose
 from reachmap.placement.mapped.imaging import can_choose
 from reachmap.placement.mapped.sample import open_frames
@@ -45,6 +46,8 @@ from reachmap.placement.problem import Question
 from reachmap.placement.search import decide_by_search
 from reachmap.placement.settings import placement_settings
 from reachmap.placement.summary import best_rows, placement_facts, row_facts
+from reachmap.placement.supports import supports_in
+from reachmap.placement.tolerance import Tolerance
 from reachmap.runtime.options import IN_PROCESS, RunOptions
 from reachmap.runtime.progress import Progress
 from reachmap.scans.document import (
@@ -84,6 +87,8 @@ class PlacementChoice:
         ``x``, ``y``, ``z`` [m] or ``yaw`` [deg] to a value.
     top : int
         Different places that are mapped with the bin in the scene.
+    tolerance : pair of float, optional
+        Shift [m] and turn [deg] to take the worst case over, instead of the cell's.
     keep_scan_configuration : bool
         Leave the cell's own, as is also done without a camera, or with one on a link
         between base and tool.
@@ -94,6 +99,7 @@ class PlacementChoice:
     limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     fixed: Mapping[str, float] = field(default_factory=dict)
     top: int = 5
+    tolerance: tuple[float, float] | None = None
     keep_scan_configuration: bool = False
 
 
@@ -144,11 +150,6 @@ def place_bin(
     )
     refuse_cell_files([output, picture], loaded)
     workspace_map = upright_workspace(workspace_map, loaded.cell.T_base_level())
-    if loaded.cell.bin_scan.orientations.reference == "robot_base":
-        raise SettingsError(
-            "bin_scan.orientations.reference is robot_base: test grasps that do not "
-            "turn with the bin cannot be placed (world and bin can)"
-        )
     region = _region(loaded, workspace_map, choice)
     scene = Scene.build(loaded, with_bin=False)
     scene.require_free_scan_configuration()
@@ -159,19 +160,8 @@ def place_bin(
         run,
         progress=Progress("place-bin", quiet=run.quiet),
     ) as evaluator:
-        keep_scan = choice.keep_scan_configuration or not can_choose(scene)
-        q = scene.scan_configuration if keep_scan else None
-        question = Question(
-            loaded=loaded,
-            workspace=workspace_map,
-            is_open=is_open,
-            region=region,
-            scene=scene,
-            moving=Scene.build(loaded, with_bin=True, bin_moves=True),
-            still_camera=_still_camera(scene),
-            keep_scan=keep_scan,
-            fit=BinFit(scene.robot, loaded, q),
-            evaluator=evaluator,
+        question = _question(
+            loaded, workspace_map, scene, is_open, region, choice, evaluator
         )
         with clock.phase("decide"):
             decision = _decide(question, choice)
@@ -185,6 +175,48 @@ def place_bin(
     if picture is not None:
         _draw(picture, placement, workspace_map, question, run)
     return placement
+
+
+def _question(
+    loaded: LoadedCell,
+    workspace: WorkspaceMap,
+    scene: Scene,
+    is_open: BoolArray,
+    region: Region,
+    choice: PlacementChoice,
+    evaluator: Evaluator,
+) -> Question:
+    cell = loaded.cell
+    keep_scan = choice.keep_scan_configuration or not can_choose(scene)
+    fit = BinFit(scene.robot, loaded, scene.scan_configuration if keep_scan else None)
+    T_level_world = inverse_transform(cell.T_base_level()) @ cell.T_base_world()
+    faces = top_faces(cell, T_level_world)
+    supports = supports_in(cell, region, faces, fit)
+    return Question(
+        loaded=loaded,
+        workspace=workspace,
+        is_open=is_open,
+        region=region,
+        scene=scene,
+        moving=Scene.build(loaded, with_bin=True, bin_moves=True),
+        still_camera=_still_camera(scene),
+        tolerance=_tolerance(loaded, choice, supports),
+        faces=faces,
+        supports=supports,
+        keep_scan=keep_scan,
+        fit=fit,
+        evaluator=evaluator,
+    )
+
+
+def _tolerance(
+    loaded: LoadedCell, choice: PlacementChoice, supports: Sequence[TopFace]
+) -> Tolerance:
+    """What the user asks for, else what the cell does."""
+    given = loaded.cell.placement.tolerance
+    shift_m, turn_deg = choice.tolerance or (given.shift_m, given.turn_deg)
+    turn_rad = float(np.radians(turn_deg))
+    return Tolerance(shift_m=shift_m, turn_rad=turn_rad, floats=not supports)
 
 
 def _still_camera(scene: Scene) -> FloatArray | None:
@@ -209,6 +241,11 @@ def _check(choice: PlacementChoice) -> None:
 def _region(
     loaded: LoadedCell, workspace: WorkspaceMap, choice: PlacementChoice
 ) -> Region:
+    if loaded.cell.bin_scan.orientations.reference == "robot_base":
+        raise SettingsError(
+            "bin_scan.orientations.reference is robot_base: test grasps that do not "
+            "turn with the bin cannot be placed (world and bin can)"
+        )
     layers = loaded.cell.bin_scan.layers
     heights = np.array([workspace.z.min() - min(layers), workspace.z.max()])
     fixed = {
@@ -276,6 +313,10 @@ def _record(
         paper_choice=outcome.paper_choice,
         rule=rule,
         candidate_pose=table.poses(),
+        tolerance=(question.tolerance.shift_m, question.tolerance.turn_rad),
+        worst_score=table.worst(),
+        score_error=table.values("error"),
+        support=question.support(table.rows[outcome.chosen].pose),
         T_world_base=placed.cell.robot.base_pose.matrix(),
         T_base_level=placed.cell.T_base_level(),
         score=table.values("score"),

@@ -111,6 +111,11 @@ class BinSpec(Record):
         0.0, description="Height of parts that fill the bin as an obstacle [m]."
     )
     frame: BaseOrWorld = Field("robot_base", description="Frame of pose.")
+    on: Name | None = Field(
+        None,
+        description="Body whose top face the bin stands on; the height of pose is "
+        "then set to it.",
+    )
     pose: PoseSpec = Field(
         PoseSpec(), description="Centre of the inner bottom, z out of the bin."
     )

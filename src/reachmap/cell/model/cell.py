@@ -15,6 +15,7 @@ from reachmap.cell.model.fields import (
     Identifier,
     Name,
     NonNegative,
+    PoseSpec,
     Positive,
     Record,
 )
@@ -31,6 +32,7 @@ from reachmap.cell.model.scans import (
 from reachmap.cell.model.tool import ToolSpec
 from reachmap.geometry import (
     inverse_transform,
+    quaternion_wxyz_from_rotation,
     transform_from_parts,
     upright_rotation,
 )
@@ -172,6 +174,16 @@ class Cell(Record):
         R_world_grid = self.robot.base_pose.matrix()[:3, :3] @ T_base_grid[:3, :3]
         upright = transform_from_parts(upright_rotation(R_world_grid), np.zeros(3))
         return np.asarray(T_base_grid @ upright)
+
+    def with_bin_at(self, T_base_bin: FloatArray, frame: BaseOrWorld) -> Cell:
+        """Copy with another pose of the bin, written in a frame."""
+        T = inverse_transform(self._in_base(frame)) @ T_base_bin
+        pose = PoseSpec(
+            xyz=tuple(T[:3, 3].tolist()),
+            quaternion_wxyz=tuple(quaternion_wxyz_from_rotation(T[:3, :3]).tolist()),
+        )
+        placed = self.bin.model_copy(update={"pose": pose, "frame": frame})
+        return self.model_copy(update={"bin": placed})
 
     def _in_base(self, frame: BaseOrWorld) -> FloatArray:
         return self.T_base_world() if frame == "world" else np.eye(4)

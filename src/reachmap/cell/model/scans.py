@@ -159,6 +159,17 @@ class BinScanSpec(Record):
         return self
 
 
+class ToleranceSpec(Record):
+    """How far the bin may end up from where it is meant to stand."""
+
+    shift_m: Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)] = Field(
+        0.03, description="In the plane [m]."
+    )
+    turn_deg: Annotated[float, Field(ge=0, le=90, allow_inf_nan=False)] = Field(
+        5.0, description="About the vertical [deg]."
+    )
+
+
 class PlacementSpec(Record):
     """Where the bin may stand, in the frame of the workspace scan, stood upright."""
 
@@ -170,6 +181,11 @@ class PlacementSpec(Record):
     )
     z: LengthRange | None = Field(
         None, description="Range of the height of the bin's inner bottom [m]."
+    )
+    tolerance: ToleranceSpec = Field(
+        ToleranceSpec(),
+        description="What the worst case of a pose is taken over; 0 and 0: the pose "
+        "itself.",
     )
     yaw_deg: AngleRange = Field(
         (0.0, 180.0),

@@ -20,6 +20,8 @@ class Candidate:
         x, y, z [m], yaw [rad] of the bin in the cell's level frame.
     score : PoseScore or None
         None exactly where there is a reason.
+    worst : float or None
+        Least score under the tolerance [percent]; None where it was not looked for.
     exact : bool
         Whether the bin was in the scene.
     reason : str
@@ -27,6 +29,7 @@ class Candidate:
 
     pose: tuple[float, float, float, float]
     score: PoseScore | None = None
+    worst: float | None = None
     exact: bool = False
     reason: str = ""
 
@@ -51,6 +54,11 @@ class CandidateTable:
         return np.array(
             [np.nan if r.score is None else getattr(r.score, name) for r in self.rows]
         )
+
+    def worst(self) -> FloatArray:
+        """Least scores under the tolerance, shape (n,); NaN where not looked for."""
+        found = [row.worst for row in self.rows]
+        return np.array([np.nan if w is None else w for w in found], float)
 
     def exact(self) -> CodeArray:
         """1 where the bin was in the scene, shape (n,)."""

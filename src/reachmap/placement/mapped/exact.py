@@ -46,12 +46,16 @@ class PoseScore:
     path_length_rad : float
         Mean over the frames with a path; infinite without any, NaN where the map was
         interpolated.
+    error : float
+        Standard error of the score, from the number of frames in the sample [points];
+        NaN where the map was interpolated.
     """
 
     score: float
     worst_point: float
     reachable_share: float
     path_length_rad: float
+    error: float = np.nan
 
 
 def bin_at(cell: Cell, pose: Pose) -> FloatArray:
@@ -236,6 +240,7 @@ class PlacedScene:
                 if found.any()
                 else np.inf
             ),
+            error=100.0 * sample.standard_error(found),
         )
 
 

@@ -56,6 +56,17 @@ class Sample:
     weight: FloatArray
     open_share: FloatArray
 
+    def standard_error(self, found: BoolArray) -> float:
+        """Standard error of the weighted share of frames that are reached.
+
+        Of the frames that the tool can take; the others are counted, not sampled. One
+        more success and one more failure than were seen keep it above 0 where all are
+        reached or none is.
+        """
+        can = self.weight > 0
+        share = (int((found & can).sum()) + 1.0) / (int(can.sum()) + 2.0)
+        return float(np.sqrt(share * (1.0 - share) * (self.weight**2).sum()))
+
     def worst_point(self, found: BoolArray) -> float:
         """Least share of a point's frames that are reached, shape (n,) to a number.
 

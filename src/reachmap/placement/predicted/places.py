@@ -17,7 +17,14 @@ YAW_STEP_DEG = 15.0
 YAWS_PER_LEVEL = 2
 
 
-def pose_grid(region: Region, x: FloatArray, y: FloatArray, z: FloatArray) -> PoseGrid:
+def pose_grid(
+    region: Region,
+    x: FloatArray,
+    y: FloatArray,
+    z: FloatArray,
+    *,
+    heights: Sequence[float] = (),
+) -> PoseGrid:
     """Grid of poses that fills a region, finer than a map's lattice.
 
     Parameters
@@ -25,6 +32,8 @@ def pose_grid(region: Region, x: FloatArray, y: FloatArray, z: FloatArray) -> Po
     region : Region
     x, y, z : array
         Lattice of the map [m].
+    heights : sequence of float
+        The only heights of the inner bottom there are [m]; empty: all in the region.
     """
     axes = [
         _steps(region.low[k], region.high[k], _spacing(values) / STEPS_PER_SQUARE)
@@ -33,7 +42,8 @@ def pose_grid(region: Region, x: FloatArray, y: FloatArray, z: FloatArray) -> Po
     yaw = _steps(region.low[3], region.high[3], np.radians(YAW_STEP_DEG))
     # Turned by half a turn, the bin stands where it stood.
     yaw = yaw[yaw < yaw[0] + np.pi - 1e-9]
-    return PoseGrid(x=axes[0], y=axes[1], z=axes[2], yaw=yaw)
+    at = np.unique(np.round(heights, 9)) if len(heights) else axes[2]
+    return PoseGrid(x=axes[0], y=axes[1], z=at, yaw=yaw)
 
 
 def best_at_each_place(

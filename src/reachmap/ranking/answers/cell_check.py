@@ -49,7 +49,11 @@ def differing_sections(bin_map: BinMap, loaded: LoadedCell) -> list[str]:
         raise MapFileError("the cell in the bin map is unreadable") from None
     kept: dict[str, Any] = {name: getattr(loaded.cell, name) for name in NOT_THE_CELL}
     placed = made_for.bin.model_copy(
-        update={"pose": loaded.cell.bin.pose, "frame": loaded.cell.bin.frame}
+        update={
+            "pose": loaded.cell.bin.pose,
+            "frame": loaded.cell.bin.frame,
+            "on": None,
+        }
     )
     neutral = made_for.model_copy(update={**kept, "bin": placed})
     made_sha256 = fingerprint(

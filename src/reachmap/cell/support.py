@@ -1,0 +1,145 @@
+"""What a bin can stand on: the level top faces of bodies that do not move."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import ConvexHull, QhullError
+
+from reachmap._typing import FloatArray
+from reachmap.cell.model.bodies import BinSpec, BodySpec
+from reachmap.cell.model.cell import Cell
+from reachmap.cell.model.shapes import triangles_of
+from reachmap.cell.text.yaml_reader import Document
+from reachmap.geometry import inverse_transform, tilt_rad
+
+# Points of a shape this far below its highest one still belong to its top face; a
+# bin that is this near to a top face stands on it.
+FLAT_M, TOUCH_M = 5e-4, 5e-3
+SLACK_M = 1e-6
+STEADY_DEG = 0.1
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TopFace:
+    """A level face, convex.
+
+    Attributes
+    ----------
+    name : str
+        Of the body.
+    polygon : array, shape (n, 2)
+        Corners, anticlockwise [m].
+    z : float
+        Height [m].
+    """
+
+    name: str
+    polygon: FloatArray
+    z: float
+
+    def overhang_m(self, points: FloatArray) -> float:
+        """How far points (n, 2) reach beyond the face, at most 0 where none does."""
+        along = np.roll(self.polygon, -1, axis=0) - self.polygon
+        outward = np.column_stack([along[:, 1], -along[:, 0]])
+        outward /= np.linalg.norm(outward, axis=1, keepdims=True)
+        away = (points[:, None] - self.polygon) * outward
+        return float(away.sum(axis=-1).max())
+
+
+def top_faces(cell: Cell, T_to_world: FloatArray) -> tuple[TopFace, ...]:
+    """Top faces of bodies on world or robot_base, in an upright frame.
+
+    Parameters
+    ----------
+    cell : Cell
+    T_to_world : array, shape (4, 4)
+        The world in that frame.
+    """
+    T_to_base = T_to_world @ inverse_transform(cell.T_base_world())
+    frames = {"world": T_to_world, "robot_base": T_to_base}
+    faces = (
+        _top_face(body, frames[body.attach_to])
+        for body in cell.bodies
+        if body.attach_to in frames and body.shape.mesh is None
+    )
+    return tuple(face for face in faces if face is not None)
+
+
+def _top_face(body: BodySpec, T_to_parent: FloatArray) -> TopFace | None:
+    points = triangles_of(body.shape).vertices
+    T = T_to_parent @ body.pose.matrix()
+    points = points @ T[:3, :3].T + T[:3, 3]
+    top = float(points[:, 2].max())
+    flat = points[points[:, 2] > top - FLAT_M, :2]
+    try:
+        polygon = flat[ConvexHull(flat).vertices]
+    except (QhullError, ValueError):
+        return None
+    return TopFace(name=body.name, polygon=polygon, z=top)
+
+
+def footprint_of_bin(spec: BinSpec, T_to_bin: FloatArray) -> FloatArray:
+    """Corners of a bin's outer bottom from above, shape (4, 2) [m]."""
+    half = np.array(spec.inner[:2]) / 2 + spec.wall
+    corners = half * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
+    return np.asarray(corners @ T_to_bin[:2, :2].T + T_to_bin[:2, 3])
+
+
+def bottom_m(spec: BinSpec) -> float:
+    """Thickness of a bin's bottom [m]."""
+    return spec.wall if spec.bottom is None else spec.bottom
+
+
+def support_of(spec: BinSpec, T_to_bin: FloatArray, faces: tuple[TopFace, ...]) -> str:
+    """Name of the body that a bin stands on, "" where it floats.
+
+    Parameters
+    ----------
+    spec : BinSpec
+    T_to_bin : array, shape (4, 4)
+        In the frame of the faces.
+    faces : tuple of TopFace
+    """
+    centre, z = T_to_bin[None, :2, 3], T_to_bin[2, 3] - bottom_m(spec)
+    under = (
+        face.name
+        for face in faces
+        if abs(face.z - z) <= TOUCH_M and face.overhang_m(centre) <= 0
+    )
+    return next(under, "")
+
+
+def stood_on_support(document: Document, cell: Cell) -> Cell:
+    """The cell with its bin on the body that ``bin.on`` names, if it names one.
+
+    Mistakes are added to the document where the body has no level top face, the bin
+    does not fit on it, or leans.
+    """
+    name = cell.bin.on
+    if name is None:
+        return cell
+    where = ("bin", "on")
+    T_base_world = cell.T_base_world()
+    T_world_bin = inverse_transform(T_base_world) @ cell.T_base_bin()
+    faces = [face for face in top_faces(cell, np.eye(4)) if face.name == name]
+    if not faces:
+        known = ", ".join(face.name for face in top_faces(cell, np.eye(4))) or "none"
+        document.add(
+            where,
+            f"{name!r} is no body with a level top face that is attached to world or "
+            f"robot_base (those are: {known})",
+        )
+        return cell
+    if np.degrees(tilt_rad(T_world_bin[:3, :3])) > STEADY_DEG:
+        document.add(where, f"the bin leans, so it cannot stand flat on {name!r}")
+        return cell
+    over = faces[0].overhang_m(footprint_of_bin(cell.bin, T_world_bin))
+    if over > SLACK_M:
+        document.add(
+            where, f"the bin hangs {1e3 * over:.0f} mm over the edge of {name!r}"
+        )
+        return cell
+    T_world_bin[2, 3] = faces[0].z + bottom_m(cell.bin)
+    return cell.with_bin_at(T_base_world @ T_world_bin, cell.bin.frame)

@@ -1,0 +1,71 @@
+"""What a bin is to stand on where there is something, and where on it there is room."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from reachmap.cell.model.cell import Cell
+from reachmap.cell.support import SLACK_M, TopFace, bottom_m, footprint_of_bin
+from reachmap.core.collision.bin_fit import BinFit
+from reachmap.errors import SettingsError
+from reachmap.geometry import yaw_transform
+from reachmap.placement.mapped.exact import bin_at
+from reachmap.placement.predicted.region import Region
+
+# A face is tried on a grid this wide [m] and at these angles until a bin fits.
+STEP_M, YAWS = 0.05, 4
+
+
+def supports_in(
+    cell: Cell, region: Region, faces: Sequence[TopFace], fit: BinFit
+) -> tuple[TopFace, ...]:
+    """The body that the cell names, else every one that has room for the bin.
+
+    Parameters
+    ----------
+    cell : Cell
+    region : Region
+    faces : sequence of TopFace
+        In the level frame.
+    fit : BinFit
+
+    Raises
+    ------
+    SettingsError
+        The body that the cell names is out of the region.
+    """
+    low, high = region.low[2] - SLACK_M, region.high[2] + SLACK_M
+    within = [face for face in faces if low <= face.z + bottom_m(cell.bin) <= high]
+    if cell.bin.on is None:
+        return tuple(face for face in within if has_room(cell, region, face, fit))
+    named = tuple(face for face in within if face.name == cell.bin.on)
+    if not named:
+        raise SettingsError(
+            f"bin.on: the top of {cell.bin.on!r} is not between the heights that the "
+            "map, placement.z and --heights leave"
+        )
+    return named
+
+
+def has_room(cell: Cell, region: Region, face: TopFace, fit: BinFit) -> bool:
+    """Whether a bin can stand somewhere on a face, within the region."""
+    low = np.maximum(region.low[:2], face.polygon.min(axis=0))
+    high = np.minimum(region.high[:2], face.polygon.max(axis=0))
+    if (low > high).any():
+        return False
+    z = face.z + bottom_m(cell.bin)
+    x, y = (
+        np.linspace(a, b, int(np.ceil((b - a) / STEP_M)) + 1)
+        for a, b in zip(low, high, strict=True)
+    )
+    for yaw in np.linspace(region.low[3], region.high[3], YAWS, endpoint=False):
+        for at in np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2):
+            pose = (float(at[0]), float(at[1]), z, float(yaw))
+            corners = footprint_of_bin(cell.bin, yaw_transform(*pose))
+            if face.overhang_m(corners) > SLACK_M:
+                continue
+            if fit.contact(bin_at(cell, pose)) is None:
+                return True
+    return False

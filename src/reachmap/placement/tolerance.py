@@ -1,0 +1,155 @@
+"""The worst that becomes of a pose when the bin ends up a little off it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from reachmap._typing import FloatArray
+from reachmap.placement.mapped.candidates import Candidate
+from reachmap.placement.mapped.evaluator import Evaluator
+from reachmap.placement.mapped.exact import Pose
+from reachmap.placement.mapped.sample import THIN
+
+# A pose is moved away from what its neighbours miss by this much more than the
+# tolerance, so that what is found there has some room left.
+ROOM = 5.0 / 3.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tolerance:
+    """How far the bin may be off in the plane [m], and about the vertical [rad].
+
+    Where ``floats`` is set, the shift goes for its height as well: nothing says how
+    high what it will stand on is.
+    """
+
+    shift_m: float
+    turn_rad: float
+    floats: bool = False
+
+    @property
+    def is_none(self) -> bool:
+        """Whether the pose itself is all that counts."""
+        return self.shift_m == 0.0 and self.turn_rad == 0.0
+
+    def offsets(self) -> FloatArray:
+        """Poses on the edge of what is allowed, less the pose, shape (n, 4).
+
+        Each direction of the plane with each turn: the corners of the neighbourhood,
+        where reachability falls off first. A bin that floats may be off in height, too.
+        """
+        shifts = [(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)]
+        if self.shift_m == 0.0:
+            shifts = [(0.0, 0.0)]
+        turns = (1.0, -1.0) if self.turn_rad else (0.0,)
+        unit = [(x, y, 0.0, turn) for x, y in shifts for turn in turns]
+        if self.floats and self.shift_m:
+            unit += [(0.0, 0.0, 1.0, 0.0), (0.0, 0.0, -1.0, 0.0)]
+        return np.array(unit) * self.scale
+
+    @property
+    def scale(self) -> FloatArray:
+        """What is allowed of x, y, z [m] and yaw [rad], shape (4,)."""
+        return np.array([*[self.shift_m] * 3, self.turn_rad])
+
+    def widened(self) -> Tolerance:
+        """A tolerance with some room left."""
+        return Tolerance(
+            shift_m=ROOM * self.shift_m,
+            turn_rad=ROOM * self.turn_rad,
+            floats=self.floats,
+        )
+
+
+EXACT = Tolerance(shift_m=0.0, turn_rad=0.0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WorstCase:
+    """The least score under a tolerance.
+
+    Attributes
+    ----------
+    score : float
+        [percent].
+    lost : array, shape (n,)
+        What each of the tolerance's offsets costs against the pose itself [points].
+    """
+
+    score: float
+    lost: FloatArray
+
+
+def worst_case(
+    candidate: Candidate,
+    tolerance: Tolerance,
+    q: FloatArray | None,
+    is_possible: Callable[[Pose], bool],
+    evaluator: Evaluator,
+) -> WorstCase:
+    """Least score of a pose and of its neighbours.
+
+    Neighbours are mapped with the thin sample and compared with the pose itself mapped
+    with it; where the bin cannot stand the score is 0.
+
+    Parameters
+    ----------
+    candidate : Candidate
+        With an exact score.
+    tolerance : Tolerance
+    q : array, shape (dof,), or None
+        Scan configuration; see :meth:`Evaluator.evaluate`.
+    is_possible : callable
+        Whether the bin can stand at a pose.
+    evaluator : Evaluator
+    """
+    assert candidate.score is not None
+    own = candidate.score.score
+    poses = [_moved(candidate.pose, offset) for offset in tolerance.offsets()]
+    possible = [is_possible(pose) for pose in poses]
+    tried = [pose for pose, fine in zip(poses, possible, strict=True) if fine]
+    evaluator.expect(1 + len(tried))
+    here, *others = evaluator.evaluate([candidate.pose, *tried], q, grid=THIN)
+    least = here.score.score if here.score is not None else own
+    found = iter(others)
+    lost = np.full(len(poses), own)
+    for k in np.flatnonzero(possible):
+        evaluation = next(found)
+        if evaluation.score is not None:
+            lost[k] = max(least - evaluation.score.score, 0.0)
+    return WorstCase(score=own - float(lost.max(initial=0.0)), lost=lost)
+
+
+def away_from_losses(
+    pose: Pose, tolerance: Tolerance, worst: WorstCase, slack: float
+) -> Pose | None:
+    """A pose further from where the score is lost; None where nothing is.
+
+    Parameters
+    ----------
+    pose : (x, y, z [m], yaw [rad])
+    tolerance : Tolerance
+    worst : WorstCase
+    slack : float
+        A loss that does not matter [points].
+    """
+    offsets = tolerance.offsets()
+    bad = worst.lost > slack
+    if not bad.any() or bad.all():
+        return None
+    push = -(worst.lost[bad][:, None] * offsets[bad]).sum(axis=0)
+    scale = tolerance.scale
+    relative = np.divide(push, scale, out=np.zeros(4), where=scale > 0)
+    largest = float(np.abs(relative).max())
+    if largest < 1e-9:
+        return None
+    step = ROOM * scale * np.where(np.abs(relative) > largest / 2, np.sign(relative), 0)
+    return _moved(pose, step)
+
+
+def _moved(pose: Pose, offset: FloatArray | Sequence[float]) -> Pose:
+    x, y, z, yaw = (round(float(a + b), 9) for a, b in zip(pose, offset, strict=True))
+    return (x, y, z, yaw)
