@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from reachmap.placement import margins, scan_choice, search
+from reachmap.placement import margins, scan_choice, search, steadying, tolerance
 from reachmap.placement.mapped import exact, imaging, sample, viewpoints
 from reachmap.placement.predicted import places, prediction
 
@@ -18,6 +18,7 @@ def placement_settings() -> dict[str, Any]:
             "predicted": list(prediction.POINTS),
             "thin": list(sample.THIN),
             "coarse": list(sample.COARSE),
+            "quick": list(sample.QUICK),
         },
         "max_layers": sample.MAX_LAYERS,
         "share_of_checks": exact.SHARE_OF_CHECKS,
@@ -32,6 +33,14 @@ def placement_settings() -> dict[str, Any]:
         "refine_rounds": search.ROUNDS,
         "refine_halvings": search.HALVINGS,
         "refine_min_gain_points": search.MIN_GAIN_POINTS,
+        "steadying": {
+            "tried": steadying.TRIED,
+            "below_points": steadying.BELOW_POINTS,
+            "moves": steadying.MOVES,
+            "noise_points": tolerance.NOISE_POINTS,
+            "least_error": steadying.LEAST_ERROR,
+            "room": tolerance.ROOM,
+        },
         "margin_points": margins.DROP_POINTS,
         "margin_shifts_m": list(margins.SHIFTS_M),
         "margin_turns_rad": np.round(margins.TURNS_RAD, 9).tolist(),

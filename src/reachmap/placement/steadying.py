@@ -7,20 +7,21 @@ import dataclasses
 import numpy as np
 
 from reachmap.placement.mapped.candidates import Candidate
+from reachmap.placement.mapped.exact import Pose
+from reachmap.placement.mapped.sample import QUICK
 from reachmap.placement.predicted.places import rank_key
 from reachmap.placement.problem import Question
 from reachmap.placement.tolerance import (
-    Tolerance,
+    NOISE_POINTS,
     WorstCase,
     away_from_losses,
+    moved_by,
     worst_case,
 )
 
 # Poses whose neighbours are looked at, how far below the best they may score, and
 # how often each of them is moved away from what its neighbours lose.
-TRIED, BELOW_POINTS, MOVES = 3, 3.0, 2
-# Lost by a neighbour, this is the sample's noise.
-NOISE_POINTS = 0.5
+TRIED, BELOW_POINTS, MOVES = 2, 3.0, 1
 # What a margin may cost, as everywhere; equal within this are worst cases at least.
 MARGIN_POINTS, LEAST_ERROR = 5.0, 0.1
 
@@ -62,7 +63,13 @@ def steadied(question: Question, mapped: list[Candidate]) -> list[Candidate]:
 
 def worst_of(question: Question, candidate: Candidate) -> WorstCase:
     """Worst case of a pose under the tolerance asked for."""
-    return _worst(question, candidate, question.tolerance)
+    return worst_case(
+        candidate,
+        question.tolerance,
+        question.start,
+        lambda pose: _is_possible(question, pose),
+        question.evaluator,
+    )
 
 
 def _looked_at(question: Question, candidate: Candidate) -> tuple[Candidate, WorstCase]:
@@ -70,14 +77,8 @@ def _looked_at(question: Question, candidate: Candidate) -> tuple[Candidate, Wor
     return dataclasses.replace(candidate, worst=worst.score), worst
 
 
-def _worst(question: Question, candidate: Candidate, tolerance: Tolerance) -> WorstCase:
-    return worst_case(
-        candidate,
-        tolerance,
-        question.start,
-        lambda pose: question.fit.contact(question.T_base_bin(pose)) is None,
-        question.evaluator,
-    )
+def _is_possible(question: Question, pose: Pose) -> bool:
+    return question.fit.contact(question.T_base_bin(pose)) is None
 
 
 def _moved(
@@ -104,18 +105,51 @@ def _in_order(question: Question, found: list[Candidate]) -> list[Candidate]:
     assert best.score is not None
     error = max(float(np.nan_to_num(best.score.error)), LEAST_ERROR)
     equal = [c for c in found if (c.worst or 0.0) >= best.worst - error]
-    if len(equal) > 1:
-        equal.sort(key=lambda c: _preference(question, c))
-    return equal + [c for c in found if c not in equal]
+    others = [c for c in found if c not in equal]
+    return [*_by_margin(question, equal), *others]
 
 
-def _preference(question: Question, candidate: Candidate) -> tuple[float, ...]:
+def _by_margin(question: Question, equal: list[Candidate]) -> list[Candidate]:
+    """Candidates of one worst case, those with a wide margin first.
+
+    Those with short paths are looked at first; one that loses nothing in any direction
+    ends the search.
+    """
+    if len(equal) < 2:
+        return equal
+    in_turn = sorted(equal, key=_tie_key)
+    lost: dict[Pose, int] = {}
+    for candidate in in_turn:
+        lost[candidate.pose] = _directions_lost(question, candidate)
+        if lost[candidate.pose] == 0:
+            break
+    most = len(question.tolerance.steps())
+    return sorted(in_turn, key=lambda c: lost.get(c.pose, most))
+
+
+def _tie_key(candidate: Candidate) -> tuple[float, float]:
+    """Shorter paths first, to a tenth of a radian, then how square the bin stands."""
     assert candidate.score is not None
-    wide = question.tolerance.widened()
-    lost = float(_worst(question, candidate, wide).lost.max(initial=0.0))
     off_square = abs((candidate.pose[3] + np.pi / 4) % (np.pi / 2) - np.pi / 4)
-    return (
-        max(lost - MARGIN_POINTS, 0.0),
-        round(candidate.score.path_length_rad, 2),
-        round(off_square, 3),
+    return round(candidate.score.path_length_rad, 1), round(off_square, 3)
+
+
+def _directions_lost(question: Question, candidate: Candidate) -> int:
+    """In how many directions a step beyond the tolerance costs more than a margin."""
+    poses = [moved_by(candidate.pose, step) for step in question.tolerance.steps()]
+    possible = [pose for pose in poses if _is_possible(question, pose)]
+    evaluator = question.evaluator
+    evaluator.expect(1 + len(possible))
+    (here,) = evaluator.evaluate([candidate.pose], question.start, grid=QUICK)
+    if here.score is None:
+        return len(poses)
+    least = here.score.score - MARGIN_POINTS
+    found = evaluator.evaluate(
+        possible,
+        question.start,
+        above=float(np.nextafter(least, -np.inf)),
+        enough=least,
+        grid=QUICK,
     )
+    held = [e.score is not None and e.score.score >= least for e in found]
+    return len(poses) - sum(held)

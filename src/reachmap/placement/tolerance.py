@@ -11,11 +11,13 @@ from reachmap._typing import FloatArray
 from reachmap.placement.mapped.candidates import Candidate
 from reachmap.placement.mapped.evaluator import Evaluator
 from reachmap.placement.mapped.exact import Pose
-from reachmap.placement.mapped.sample import THIN
+from reachmap.placement.mapped.sample import QUICK
 
 # A pose is moved away from what its neighbours miss by this much more than the
 # tolerance, so that what is found there has some room left.
 ROOM = 5.0 / 3.0
+# Lost by a neighbour, this is the sample's noise, and no more is looked for.
+NOISE_POINTS = 0.5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,14 +40,13 @@ class Tolerance:
     def offsets(self) -> FloatArray:
         """Poses on the edge of what is allowed, less the pose, shape (n, 4).
 
-        Each direction of the plane with each turn: the corners of the neighbourhood,
-        where reachability falls off first. A bin that floats may be off in height, too.
+        Each direction of the plane with one turn or the other: the corners of the
+        neighbourhood, where reachability falls off first. A bin that floats may be off
+        in height, too.
         """
-        shifts = [(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)]
-        if self.shift_m == 0.0:
-            shifts = [(0.0, 0.0)]
-        turns = (1.0, -1.0) if self.turn_rad else (0.0,)
-        unit = [(x, y, 0.0, turn) for x, y in shifts for turn in turns]
+        unit = [(1.0, 0.0, 0.0, 1.0), (-1.0, 0.0, 0.0, -1.0)]
+        if self.shift_m:
+            unit += [(0.0, 1.0, 0.0, -1.0), (0.0, -1.0, 0.0, 1.0)]
         if self.floats and self.shift_m:
             unit += [(0.0, 0.0, 1.0, 0.0), (0.0, 0.0, -1.0, 0.0)]
         return np.array(unit) * self.scale
@@ -55,13 +56,15 @@ class Tolerance:
         """What is allowed of x, y, z [m] and yaw [rad], shape (4,)."""
         return np.array([*[self.shift_m] * 3, self.turn_rad])
 
-    def widened(self) -> Tolerance:
-        """A tolerance with some room left."""
-        return Tolerance(
-            shift_m=ROOM * self.shift_m,
-            turn_rad=ROOM * self.turn_rad,
-            floats=self.floats,
-        )
+    def mirrored(self) -> FloatArray:
+        """The offsets with the other turn, shape (n, 4)."""
+        return np.asarray(self.offsets() * np.array([1.0, 1.0, 1.0, -1.0]))
+
+    def steps(self) -> FloatArray:
+        """One step along each axis either way, with some room, shape (n, 4)."""
+        axes = (0, 1, 2, 3) if self.floats else (0, 1, 3)
+        unit = np.vstack([np.eye(4)[list(axes)], -np.eye(4)[list(axes)]])
+        return np.unique(ROOM * unit * self.scale, axis=0)
 
 
 EXACT = Tolerance(shift_m=0.0, turn_rad=0.0)
@@ -92,8 +95,8 @@ def worst_case(
 ) -> WorstCase:
     """Least score of a pose and of its neighbours.
 
-    Neighbours are mapped with the thin sample and compared with the pose itself mapped
-    with it; where the bin cannot stand the score is 0.
+    Neighbours are mapped with the quick sample and compared with the pose itself mapped
+    with it. Where the bin cannot stand the score is 0, and no other is looked at.
 
     Parameters
     ----------
@@ -108,19 +111,23 @@ def worst_case(
     """
     assert candidate.score is not None
     own = candidate.score.score
-    poses = [_moved(candidate.pose, offset) for offset in tolerance.offsets()]
-    possible = [is_possible(pose) for pose in poses]
-    tried = [pose for pose, fine in zip(poses, possible, strict=True) if fine]
-    evaluator.expect(1 + len(tried))
-    here, *others = evaluator.evaluate([candidate.pose, *tried], q, grid=THIN)
+    poses = [moved_by(candidate.pose, offset) for offset in tolerance.offsets()]
+    # Whether the bin can stand somewhere costs next to nothing, so more is asked.
+    possible = [
+        is_possible(pose) and is_possible(moved_by(candidate.pose, other))
+        for pose, other in zip(poses, tolerance.mirrored(), strict=True)
+    ]
+    if not all(possible):
+        lost = np.where(possible, 0.0, own)
+        return WorstCase(score=0.0, lost=lost)
+    evaluator.expect(1 + len(poses))
+    (here,) = evaluator.evaluate([candidate.pose], q, grid=QUICK)
     least = here.score.score if here.score is not None else own
-    found = iter(others)
-    lost = np.full(len(poses), own)
-    for k in np.flatnonzero(possible):
-        evaluation = next(found)
-        if evaluation.score is not None:
-            lost[k] = max(least - evaluation.score.score, 0.0)
-    return WorstCase(score=own - float(lost.max(initial=0.0)), lost=lost)
+    found = evaluator.evaluate(poses, q, enough=least - NOISE_POINTS, grid=QUICK)
+    lost = np.array(
+        [own if e.score is None else max(least - e.score.score, 0.0) for e in found]
+    )
+    return WorstCase(score=max(own - float(lost.max()), 0.0), lost=lost)
 
 
 def away_from_losses(
@@ -143,13 +150,17 @@ def away_from_losses(
     push = -(worst.lost[bad][:, None] * offsets[bad]).sum(axis=0)
     scale = tolerance.scale
     relative = np.divide(push, scale, out=np.zeros(4), where=scale > 0)
+    if np.abs(relative[:3]).max() > 1e-9:
+        # Each offset has a turn of its own, of which a loss to its shift says nothing.
+        relative[3] = 0.0
     largest = float(np.abs(relative).max())
     if largest < 1e-9:
         return None
     step = ROOM * scale * np.where(np.abs(relative) > largest / 2, np.sign(relative), 0)
-    return _moved(pose, step)
+    return moved_by(pose, step)
 
 
-def _moved(pose: Pose, offset: FloatArray | Sequence[float]) -> Pose:
+def moved_by(pose: Pose, offset: FloatArray | Sequence[float]) -> Pose:
+    """A pose and an offset of it, rounded so that equal ones are found again."""
     x, y, z, yaw = (round(float(a + b), 9) for a, b in zip(pose, offset, strict=True))
     return (x, y, z, yaw)

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 Grid = tuple[int, int, int]
 COARSE: Grid = (8, 6, 3)
 THIN: Grid = (6, 5, 3)
+QUICK: Grid = (4, 3, 3)
 MAX_LAYERS = 3
 LEAST_ORIENTATIONS = 4
 
