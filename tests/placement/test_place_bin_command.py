@@ -293,7 +293,26 @@ def test_json_is_one_object_with_what_is_stored(toy):
     assert set(facts["margin_m"]) == {"+x", "-x", "+y", "-y", "+z", "-z"}
     assert set(facts["margin_deg"]) == {"+yaw", "-yaw"}
     assert facts["output"] == str(toy / "placement.h5")
-    assert facts["runner_up"]["score_percent"] <= facts["chosen"]["score_percent"]
+    assert facts["tolerance"] == {"shift_m": 0.03, "turn_deg": 5.0}
+    assert facts["chosen"]["worst_case_percent"] == pytest.approx(
+        placement.worst_score[placement.chosen], abs=0.01
+    )
+    assert facts["chosen"]["worst_case_percent"] == pytest.approx(
+        np.nanmax(placement.worst_score), abs=facts["chosen"]["score_error_points"]
+    )
+
+
+def test_without_a_tolerance_the_best_score_is_chosen(toy, tmp_path):
+    """--tolerance 0 0 asks for the pose itself, and no worst case is stated."""
+    output = tmp_path / "placement.h5"
+    place(toy / "workspace.h5", "-o", output, "--tolerance", 0, 0, *AT_TOY_HEIGHT)
+    placement = read_placement(output)
+    assert placement.tolerance == (0.0, 0.0)
+    exact = placement.exact > 0
+    assert placement.score[placement.chosen] >= np.nanmax(placement.score[exact]) - 0.5
+    assert np.isnan(placement.worst_score).all()
+    steady = read_placement(toy / "placement.h5")
+    assert steady.score_error[steady.chosen] > 0
 
 
 def test_top_is_how_many_places_are_mapped_and_printed(toy, tmp_path):
@@ -363,3 +382,31 @@ def test_two_workers_agree_on_the_shipped_cell(ur5, tmp_path):
         assert result.exit_code == 0, result.stderr
         hashes.add(read_placement(output).stamp.content_sha256)
     assert len(hashes) == 1
+
+
+def test_with_something_to_stand_on_every_pose_stands_on_it(toy, tmp_path):
+    """Heights are those of the table, footprints inside it, and its name is stored."""
+    bin_spec = read_cell("planar-toy").cell.bin
+    centre_z = -0.2 - bin_spec.bottom_m - 0.01
+    table = (
+        'bodies.0={"name":"table","shape":{"box":[1.2,0.6,0.02]},'
+        f'"pose":{{"xyz":[0.0,0.5,{centre_z}]}}}}'
+    )
+    output = tmp_path / "placement.h5"
+    result = place(toy / "workspace.h5", "-o", output, "--set", table)
+    assert result.exit_code == 0, result.stderr
+    assert "the bin stands on table" in result.stdout
+    placement = read_placement(output)
+    assert placement.support == "table"
+    fits = [k for k, reason in enumerate(placement.reason) if not reason]
+    fits = [k for k in fits if k != placement.paper_choice]
+    assert len(fits) > 3
+    half = np.array(bin_spec.inner[:2]) / 2 + np.array(bin_spec.walls)
+    for row in fits:
+        x, y, z, yaw = placement.candidate_pose[row]
+        assert z == pytest.approx(-0.2)
+        c, s = np.cos(yaw), np.sin(yaw)
+        for sx, sy in [(-1, -1), (1, -1), (1, 1), (-1, 1)]:
+            u, v = sx * half[0], sy * half[1]
+            assert abs(x + c * u - s * v) <= 0.6 + 1e-6
+            assert abs(y + s * u + c * v - 0.5) <= 0.3 + 1e-6

@@ -82,14 +82,9 @@ def _top_face(body: BodySpec, T_to_parent: FloatArray) -> TopFace | None:
 
 def footprint_of_bin(spec: BinSpec, T_to_bin: FloatArray) -> FloatArray:
     """Corners of a bin's outer bottom from above, shape (4, 2) [m]."""
-    half = np.array(spec.inner[:2]) / 2 + spec.wall
+    half = np.array(spec.inner[:2]) / 2 + spec.walls
     corners = half * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
     return np.asarray(corners @ T_to_bin[:2, :2].T + T_to_bin[:2, 3])
-
-
-def bottom_m(spec: BinSpec) -> float:
-    """Thickness of a bin's bottom [m]."""
-    return spec.wall if spec.bottom is None else spec.bottom
 
 
 def support_of(spec: BinSpec, T_to_bin: FloatArray, faces: tuple[TopFace, ...]) -> str:
@@ -102,7 +97,7 @@ def support_of(spec: BinSpec, T_to_bin: FloatArray, faces: tuple[TopFace, ...]) 
         In the frame of the faces.
     faces : tuple of TopFace
     """
-    centre, z = T_to_bin[None, :2, 3], T_to_bin[2, 3] - bottom_m(spec)
+    centre, z = T_to_bin[None, :2, 3], T_to_bin[2, 3] - spec.bottom_m
     under = (
         face.name
         for face in faces
@@ -141,5 +136,5 @@ def stood_on_support(document: Document, cell: Cell) -> Cell:
             where, f"the bin hangs {1e3 * over:.0f} mm over the edge of {name!r}"
         )
         return cell
-    T_world_bin[2, 3] = faces[0].z + bottom_m(cell.bin)
+    T_world_bin[2, 3] = faces[0].z + cell.bin.bottom_m
     return cell.with_bin_at(T_base_world @ T_world_bin, cell.bin.frame)

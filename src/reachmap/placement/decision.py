@@ -160,17 +160,11 @@ def nowhere(question: Question, table: CandidateTable) -> str:
     return f"{question.loaded.source}: the bin can stand nowhere in the region{why}"
 
 
-def refuse_nothing(question: Question, decision: Decision) -> None:
-    """Refuse to choose among poses of which none serves a single test frame.
-
-    Raises
-    ------
-    SceneError
-        With the likeliest cause at the best of them.
-    """
+def why_no_place(question: Question, decision: Decision) -> str:
+    """Say why no pose serves a single test frame; "" where one does."""
     best = decision.table.rows[decision.ranked[0]]
     if best.score is None or best.score.score > 0.0:
-        return
+        return ""
     sample = sample_of(question.loaded.cell, THIN, question.is_open)
     placed = PlacedScene(question.moving, best.pose, sample)
     approach_m = question.loaded.cell.bin_scan.approach_distance_m
@@ -180,7 +174,7 @@ def refuse_nothing(question: Question, decision: Decision) -> None:
     pairs = placed.scene.checker.body_pairs
     why = likeliest_cause(status, survey.blocking_pair, pairs)
     x, y, z, yaw = best.pose
-    raise SceneError(
+    return (
         f"{question.loaded.source}: no place for the bin: even at x={x:.3f} y={y:.3f} "
         f"z={z:.3f} yaw={np.degrees(yaw):.0f} {why}"
     )

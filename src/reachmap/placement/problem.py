@@ -12,7 +12,6 @@ from reachmap._typing import BoolArray, FloatArray
 from reachmap.cell.support import (
     SLACK_M,
     TopFace,
-    bottom_m,
     footprint_of_bin,
     support_of,
 )
@@ -119,7 +118,7 @@ class Question:
     def _overhang(self, pose: Pose) -> str:
         """Why the bin does not stand on a support at a pose, or ""."""
         bin_spec = self.loaded.cell.bin
-        z = pose[2] - bottom_m(bin_spec)
+        z = pose[2] - bin_spec.bottom_m
         under = [face for face in self.supports if abs(face.z - z) < 1e-6]
         if not under:
             return "the bin stands on nothing"
@@ -167,7 +166,7 @@ class Question:
     def predicted(self) -> list[Candidate]:
         """Best pose at each place, by interpolation of the map."""
         workspace = self.workspace
-        heights = [face.z + bottom_m(self.loaded.cell.bin) for face in self.supports]
+        heights = [face.z + self.loaded.cell.bin.bottom_m for face in self.supports]
         grid = pose_grid(
             self.region, workspace.x, workspace.y, workspace.z, heights=heights
         )

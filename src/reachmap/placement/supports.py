@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from reachmap.cell.model.cell import Cell
-from reachmap.cell.support import SLACK_M, TopFace, bottom_m, footprint_of_bin
+from reachmap.cell.support import SLACK_M, TopFace, footprint_of_bin
 from reachmap.core.collision.bin_fit import BinFit
 from reachmap.errors import SettingsError
 from reachmap.geometry import yaw_transform
@@ -37,7 +37,7 @@ def supports_in(
         The body that the cell names is out of the region.
     """
     low, high = region.low[2] - SLACK_M, region.high[2] + SLACK_M
-    within = [face for face in faces if low <= face.z + bottom_m(cell.bin) <= high]
+    within = [face for face in faces if low <= face.z + cell.bin.bottom_m <= high]
     if cell.bin.on is None:
         return tuple(face for face in within if has_room(cell, region, face, fit))
     named = tuple(face for face in within if face.name == cell.bin.on)
@@ -55,7 +55,7 @@ def has_room(cell: Cell, region: Region, face: TopFace, fit: BinFit) -> bool:
     high = np.minimum(region.high[:2], face.polygon.max(axis=0))
     if (low > high).any():
         return False
-    z = face.z + bottom_m(cell.bin)
+    z = face.z + cell.bin.bottom_m
     x, y = (
         np.linspace(a, b, int(np.ceil((b - a) / STEP_M)) + 1)
         for a, b in zip(low, high, strict=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections import Counter
 
 import numpy as np
@@ -20,6 +21,7 @@ from reachmap.plots.parts.outlines import (
     bin_outlines,
     draw_outline,
     legend_lines,
+    margin_envelope,
 )
 from reachmap.plots.parts.squares import (
     MINUS,
@@ -210,6 +212,11 @@ def _draw_bins(
                 z_high=z,
             )
         )
+    outlines += [
+        dataclasses.replace(outline, name=f"{outline.name} (stands on)")
+        for outline in context.standing
+        if placement.support and outline.name == placement.support
+    ]
     for outline in outlines:
         draw_outline(axes, outline)
     _draw_bin_axis(axes, placement)
@@ -236,7 +243,8 @@ def _bins(placement: BinPlacement, context: CellContext) -> list[Outline]:
         placement.T_level_bin(),
         name="chosen bin (arrow: its x axis)",
     )
-    return outlines
+    pose = placement.candidate_pose[placement.chosen]
+    return [*margin_envelope(spec, pose, placement.margin), *outlines]
 
 
 def _draw_bin_axis(axes: Axes, placement: BinPlacement) -> None:

@@ -10,8 +10,9 @@ import numpy as np
 from reachmap._typing import FloatArray
 from reachmap.cell.loading import LoadedCell, read_cell
 from reachmap.cell.model.shapes import shape_text
+from reachmap.cell.support import support_of, top_faces
 from reachmap.core.scene import Scene
-from reachmap.geometry import AXES, tilt_rad
+from reachmap.geometry import AXES, inverse_transform, tilt_rad
 from reachmap.placement.mapped.imaging import picture_of
 
 
@@ -175,6 +176,14 @@ def _joints(scene: Scene) -> tuple[JointRow, ...]:
     return tuple(rows)
 
 
+def _support(loaded: LoadedCell) -> str:
+    """What the bin stands on, or that it floats."""
+    cell = loaded.cell
+    T_world_bin = inverse_transform(cell.T_base_world()) @ cell.T_base_bin()
+    name = support_of(cell.bin, T_world_bin, top_faces(cell, np.eye(4)))
+    return name or "nothing (it floats)"
+
+
 def _bodies(loaded: LoadedCell) -> tuple[BodyRow, ...]:
     rows = [
         BodyRow(
@@ -192,7 +201,7 @@ def _bodies(loaded: LoadedCell) -> tuple[BodyRow, ...]:
     rows.append(
         BodyRow(
             name="bin",
-            attach_to="robot_base",
+            attach_to=_support(loaded),
             shape=f"{carrier}inside {inner} m, wall {walls} m",
             touch=tray.touch,
         )

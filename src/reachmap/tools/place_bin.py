@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -14,7 +15,7 @@ from reachmap.cell.support import TopFace, top_faces
 from reachmap.core.collision.bin_fit import BinFit
 from reachmap.core.collision.camera import Camera
 from reachmap.core.scene import Scene
-from reachmap.errors import SettingsError
+from reachmap.errors import SceneError, SettingsError
 from reachmap.geometry import inverse_transform
 from reachmap.maps import (
     BinPlacement,
@@ -33,8 +34,8 @@ from reachmap.placement.decision import (
     Outcome,
     decide_as_given,
     decide_by_paper,
-    refuse_nothing,
     settle,
+    why_no_place,
 )
 from reachmap.placement.mapped.evaluator import Evaluator, open_evaluator
 from reachmap.placement.mapped.exact import Pose
@@ -60,6 +61,8 @@ from reachmap.tools.prologue import refuse_cell_files
 
 if TYPE_CHECKING:
     from reachmap.cell.loading import LoadedCell
+
+logger = logging.getLogger(__name__)
 
 __all__ = [
     "PlacementChoice",
@@ -165,8 +168,11 @@ def place_bin(
         )
         with clock.phase("decide"):
             decision = _decide(question, choice)
-            if choice.bin_pose is None:
-                refuse_nothing(question, decision)
+            why = why_no_place(question, decision)
+            if why and choice.bin_pose is None and choice.rule == "search":
+                raise SceneError(why)
+            if why:
+                logger.warning("%s", why)
         with clock.phase("settle"):
             outcome = settle(question, decision)
         clock.add_cpu("workers", evaluator.cpu_s if run.workers > 1 else 0.0)

@@ -5,7 +5,7 @@ They are in the level frame of the cell, which is robot_base where that is uprig
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, TypeAlias
@@ -24,15 +24,22 @@ from reachmap.cell.meshes.reading import read_mesh
 from reachmap.cell.model.cell import BinSpec, Cell
 from reachmap.cell.model.fields import CylinderShape, Shape
 from reachmap.cell.model.shapes import box_corners, triangles_of
-from reachmap.geometry import inverse_transform
+from reachmap.geometry import inverse_transform, yaw_transform
 from reachmap.plots.parts.style import BIN_COLOUR, INK
 
-Kind: TypeAlias = Literal["base", "body", "bin", "runner-up", "paper", "camera"]
+Kind: TypeAlias = Literal[
+    "base", "body", "bin", "envelope", "runner-up", "paper", "camera"
+]
 
 LOOKS: dict[str, dict[str, Any]] = {
     "base": {"edgecolor": INK, "linewidth": 1.5},
     "body": {"edgecolor": INK, "linewidth": 1.1, "linestyle": (0, (5, 2))},
     "bin": {"edgecolor": BIN_COLOUR, "linewidth": 1.8},
+    "envelope": {
+        "edgecolor": BIN_COLOUR,
+        "linewidth": 0.9,
+        "linestyle": (0, (1, 1.5)),
+    },
     "runner-up": {
         "edgecolor": BIN_COLOUR,
         "linewidth": 1.5,
@@ -119,6 +126,33 @@ def bin_outlines(
         points += np.array([0.0, 0.0, (spec.inner[2] - spec.bottom_m) / 2.0])
         outlines.append(hull_outline(label, kind, _moved(T_level_bin, points)))
     return tuple(outlines)
+
+
+def margin_envelope(
+    spec: BinSpec, pose: FloatArray, margin: Mapping[str, float]
+) -> tuple[Outline, ...]:
+    """Outline of all that a bin covers while it is off by its margins, if it has any.
+
+    Parameters
+    ----------
+    spec : BinSpec
+    pose : array, shape (4,)
+        x, y, z [m], yaw [rad] in the level frame.
+    margin : mapping
+        Direction, such as ``+x`` or ``-yaw``, to how far [m or rad].
+    """
+    axes = {"x": 0, "y": 1, "yaw": 3}
+    corners = []
+    for name, value in margin.items():
+        if name[1:] in axes:
+            moved = np.array(pose)
+            moved[axes[name[1:]]] += float(f"{name[0]}1") * value
+            outer = bin_outlines(spec, yaw_transform(*moved.tolist()))[0]
+            corners.append(np.insert(outer.polygon, 2, pose[2], axis=1))
+    if not corners:
+        return ()
+    points = np.concatenate(corners)
+    return (hull_outline("where it may be off to (margin)", "envelope", points),)
 
 
 def _moved(T: FloatArray, points: FloatArray) -> FloatArray:
