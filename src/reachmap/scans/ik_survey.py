@@ -235,7 +235,11 @@ class _Surveyor:
             self._status[k] = Status.NOT_ATTEMPTED
             return [q[None] for q in Q[free]]
         ways = [w for q in Q[free] if (w := self._way(self._T[k], q)) is not None]
-        found = [way for way in ways if self._approach.is_free(way)]
+        found = [
+            straight
+            for way in ways
+            if (straight := self._approach.free_and_straight(way)) is not None
+        ]
         self._status[k] = Status.NOT_ATTEMPTED if found else Status.APPROACH_BLOCKED
         if not found:
             self._pair[k] = next(
