@@ -46,7 +46,9 @@ class RoadmapSpec(Record):
         description="Configurations of the lazy roadmap around what stays open.",
     )
     sample_checks: Checks = Field(
-        15000, description="State checks of the lazy roadmap for a component."
+        60000,
+        description="State checks of the lazy roadmap for a component; an eighth of "
+        "that for each once three times as many are spent.",
     )
     sample_neighbours: Few = Field(
         14, description="Neighbours of a configuration of the lazy roadmap."

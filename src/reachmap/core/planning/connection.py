@@ -36,6 +36,9 @@ from reachmap.core.planning.roadmap import START, Goals, Roadmap
 # near by, which finds most of what is easy, and for the two at each component, of which
 # there are many where something is unreachable. Chosen on six hard cells, by checks.
 _LEAST, _FEW, _SOME = 0.05, 0.1, 0.2
+# Where many components stay open, so many searches of samples have their full budget,
+# and the others, which are smaller, a part of it.
+_FULL_SEARCHES, _LEAST_SHARE = 3, 8
 # A tree of LBKPIECE1 that found nothing soon is begun anew; RRTConnect finds 1 of 6
 # frames in a cage when begun anew every 150 checks, and 6 of 6 when it is left to grow.
 _RESTARTS = {"RRTConnect": None}
@@ -139,6 +142,7 @@ class _Connector:
         self._plans = 0
         self._order = list(range(len(spec.planners)))
         self._samples: LazySamples | None = None
+        self._sample_checks_left = _FULL_SEARCHES * spec.sample_checks
         self._nearest = _NearestReached(roadmap, self._Q, self._weight, windings)
         self._candidates = CandidateMotions.of(self._Q, self._weight, windings, spec)
         self._known = KnownMotions(motions, len(self._Q))
@@ -293,8 +297,11 @@ class _Connector:
                 np.random.default_rng([self._seed, 1 << 20]),
             )
         part.attempts += 1
+        most, before = self._spec.sample_checks, self._motions.checker.checks
+        budget = max(most // _LEAST_SHARE, min(most, self._sample_checks_left))
         with _Meter(self, part, SAMPLES):
-            way = self._samples.way_out(part.members, self._spec.sample_checks)
+            way = self._samples.way_out(part.members, budget)
+        self._sample_checks_left -= self._motions.checker.checks - before
         part.agreed = way is None
         if way is None:
             return False

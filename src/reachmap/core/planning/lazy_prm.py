@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from reachmap._typing import BoolArray, FloatArray, IntArray
+from reachmap._typing import FloatArray, IntArray
 from reachmap.cell.model.roadmap import RoadmapSpec
 from reachmap.core.kinematics.windings import TURN_RAD, Windings
 from reachmap.core.planning.candidates import NearestNeighbours
@@ -158,12 +158,10 @@ class LazySamples:
             self._near_samples.of(q, spec.sample_neighbours)[1][0] + self._goals,
         ]
         rows = np.concatenate(near)
+        # However long: a few hundred samples lie far apart in six dimensions.
         change, _ = self._windings.shortest(self._Q[rows] - q)
-        usable: BoolArray = np.abs(change).max(axis=1) <= spec.longest_motion_rad
         lengths = np.linalg.norm(change, axis=1)
-        for row, length in zip(
-            rows[usable].tolist(), lengths[usable].tolist(), strict=True
-        ):
+        for row, length in zip(rows.tolist(), lengths.tolist(), strict=True):
             total = distance + length
             heapq.heappush(pending, (total + float(left[row]), total, row, node))
 
