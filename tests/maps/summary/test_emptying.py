@@ -79,6 +79,8 @@ def test_a_full_bin_that_cannot_be_picked_everywhere_says_so():
 def test_a_single_layer_has_no_curve_and_several_have_a_picture():
     """Its points are the percentages, from full to empty."""
     assert emptying_of(a_map(np.ones((1, 4, 4), bool))) is None
+    unfinished = np.zeros((2, 4, 4, 3, 1), bool)
+    assert emptying_of(synthetic_bin_map(unfinished, status=unfinished[..., 0])) is None
     reached = np.ones((3, 6, 8), bool)
     reached[0, 0] = False
     record = a_map(reached)

@@ -80,10 +80,13 @@ class Emptying:
 
 
 def emptying_of(record: BinMap) -> Emptying | None:
-    """Sum up a bin map by the height of its layers; None of a single one."""
-    if len(record.layer) < 2:
-        return None
+    """Sum up a bin map by the height of its layers.
+
+    None of a single layer, and of a map that has points which were not tried.
+    """
     directions, points = reachability_of_directions(record)
+    if len(record.layer) < 2 or np.isnan(points).any():
+        return None
     depth = float(record.bin_inner[2])
     cycle = None if record.cycle is None else record.cycle.reachability
     levels = tuple(
@@ -97,8 +100,7 @@ def emptying_of(record: BinMap) -> Emptying | None:
         )
         for k, height in enumerate(record.layer)
     )
-    reached = points > 0  # what was not tried cannot be said to be picked
-    stuck = ~reached
+    stuck = points == 0
     whole = np.flatnonzero(stuck.any(axis=(1, 2)))
     lowest = 0 if not len(whole) else int(whole[-1]) + 1
     left = volume_left(stuck, record.layer, depth)
