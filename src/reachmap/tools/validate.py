@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import logging
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -33,6 +34,9 @@ from reachmap.validation.summary import Validation, summarise
 
 DEFAULT_ROLLS = 24
 MAX_ROLLS, MAX_REPEATS = 360, 255
+
+
+logger = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -134,6 +138,11 @@ def validate(
         raise GraspListError("there are no grasps to plan to")
     scene = Scene.shared(context.loaded, with_bin=True)
     scene.require_free_scan_configuration()
+    if context.loaded.cell.bin_scan.is_filled:
+        logger.warning(
+            "%s: scanned at levels of filling; grasps are planned to in the empty bin",
+            map_path,
+        )
     results = plan_picks(context, run, progress=Progress("validate", quiet=run.quiet))
     validation = summarise(
         [
