@@ -221,7 +221,7 @@ def _lines(placement: BinPlacement, output: Path, top: int) -> Iterator[str]:
     yield from _stand(facts)
     limit = facts["tool_limit_percent"]
     if limit is not None and limit < 100:
-        yield f"no pose can score more than {limit:.1f}%: the tool itself meets the bin"
+        yield from _limit(facts)
     yield (
         f"{facts['candidates']} poses considered, {facts['mapped_with_bin']} mapped "
         f"with the bin in the scene, {facts['excluded']} excluded"
@@ -244,6 +244,24 @@ def _stand(facts: dict[str, Any]) -> Iterator[str]:
             f"worst case: the bin off by {1000 * tolerance['shift_m']:.0f} mm and "
             f"{tolerance['turn_deg']:g}°"
         )
+
+
+def _limit(facts: dict[str, Any]) -> Iterator[str]:
+    """What the tool itself loses, and which dimension would move that."""
+    body = facts["tool_limit_body"] or "the tool"
+    yield (
+        f"no pose can score more than {facts['tool_limit_percent']:.1f}%: the tool "
+        f"itself meets the bin ({body} most)"
+    )
+    gains = [
+        f"{name} +{points:.1f} points"
+        for name, points in (facts["tool_limit_gains"] or {}).items()
+        if points >= 0.05
+    ]
+    short = facts["tool_limit_percent"] - facts["chosen"]["score_percent"]
+    error = facts["chosen"].get("score_error_points") or 0.0
+    if gains and short <= error:
+        yield "the tool is the limit here; 20 mm more would give: " + ", ".join(gains)
 
 
 def _row_text(facts: dict[str, Any], role: str) -> str:

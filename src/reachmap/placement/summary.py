@@ -8,6 +8,8 @@ import numpy as np
 
 from reachmap.maps.records import BinPlacement
 
+TOOL_LIMIT = ("tool_limit_percent", "tool_limit_body", "tool_limit_gains")
+
 
 def placement_facts(placement: BinPlacement) -> dict[str, Any]:
     """Everything that decides, as JSON values.
@@ -17,8 +19,10 @@ def placement_facts(placement: BinPlacement) -> dict[str, Any]:
     dict
         ``rule``, ``chosen``, ``runner_up``, ``paper`` (rows, or None), ``margin``,
         ``scan_configuration``, counts of candidates, and ``tool_limit_percent``, the
-        share of test grasps that the tool itself can take in this bin.
+        share of test grasps that the tool itself can take in this bin, with the body
+        that is in the way and what 20 mm of a dimension would give back [points].
     """
+    settings = placement.provenance.settings.get("placement", {})
     excluded = sum(1 for reason in placement.reason if reason)
     return {
         "rule": placement.rule,
@@ -44,9 +48,8 @@ def placement_facts(placement: BinPlacement) -> dict[str, Any]:
         "candidates": len(placement.reason),
         "mapped_with_bin": int((placement.exact > 0).sum()),
         "excluded": excluded,
-        "tool_limit_percent": placement.provenance.settings.get("placement", {}).get(
-            "tool_limit_percent"
-        ),
+        "figure": "path reachability of test grasps, every roll for itself",
+        **{name: settings.get(name) for name in TOOL_LIMIT},
     }
 
 

@@ -49,6 +49,7 @@ from reachmap.placement.settings import placement_settings
 from reachmap.placement.summary import best_rows, placement_facts, row_facts
 from reachmap.placement.supports import supports_in
 from reachmap.placement.tolerance import Tolerance
+from reachmap.placement.tool_limit import tool_limit
 from reachmap.runtime.options import IN_PROCESS, RunOptions
 from reachmap.runtime.progress import Progress
 from reachmap.scans.document import (
@@ -292,6 +293,7 @@ def _record(
     )
     scene = Scene.build(placed, with_bin=True)
     scene.require_free_scan_configuration()
+    limit = tool_limit(scene.robot, placed, question.is_open)
     rule = "given" if choice.bin_pose is not None else choice.rule
     document = scan_document(
         scene,
@@ -306,7 +308,9 @@ def _record(
                 "limits": {k: list(v) for k, v in choice.limits.items()},
                 "fixed": dict(choice.fixed),
                 "scan_configuration": "new" if outcome.scan.is_new else "kept",
-                "tool_limit_percent": round(100 * float(question.is_open.mean()), 2),
+                "tool_limit_percent": round(limit.percent, 2),
+                "tool_limit_body": limit.body,
+                "tool_limit_gains": limit.gains,
             },
         },
         source_sha256=question.workspace.stamp.content_sha256,

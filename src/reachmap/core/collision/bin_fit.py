@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pinocchio as pin
 
-from reachmap._typing import BoolArray, FloatArray
+from reachmap._typing import BoolArray, FloatArray, IntArray
 from reachmap.cell.model.bin_parts import BinPart
 from reachmap.cell.model.fields import Shape
 from reachmap.cell.model.shapes import corner_points, shrunk
@@ -124,6 +124,11 @@ class ToolFit:
     ----------
     robot : RobotModel
     loaded : LoadedCell
+
+    Attributes
+    ----------
+    bodies : tuple of PlacedBody
+        The tool's, in the TCP's frame.
     """
 
     def __init__(self, robot: RobotModel, loaded: LoadedCell) -> None:
@@ -131,11 +136,11 @@ class ToolFit:
         geometry = build_geometry(robot, loaded, with_bin=False)
         bodies = bodies_at(robot, geometry, q)
         T_tcp_base = inverse_transform(_tcp_pose(robot, q))
-        self._tool = [
+        self.bodies = tuple(
             PlacedBody(name=b.name, joint=b.joint, shape=b.shape, T=T_tcp_base @ b.T)
             for b in bodies
             if b.joint == robot.tcp_joint
-        ]
+        )
         self._walls = PlacedBodies(
             (
                 PlacedBody(name=name, joint=ROOT, shape=shape, T=_at(centre))
@@ -149,19 +154,33 @@ class ToolFit:
 
     def blocked(self, T_bin_tcp: FloatArray) -> BoolArray:
         """Whether the tool touches the bin, shape (n, 4, 4) to (n,)."""
-        blocked = np.zeros(len(T_bin_tcp), bool)
-        for body in self._tool:
+        return self.first_hit(T_bin_tcp, self.bodies) >= 0
+
+    def first_hit(
+        self, T_bin_tcp: FloatArray, bodies: Sequence[PlacedBody]
+    ) -> IntArray:
+        """Which of some bodies touches the bin first, (n, 4, 4) to (n,); -1: none.
+
+        Parameters
+        ----------
+        T_bin_tcp : array, shape (n, 4, 4)
+        bodies : sequence of PlacedBody
+            In the TCP's frame: the tool's own, or others in their place.
+        """
+        first = np.full(len(T_bin_tcp), -1)
+        for index, body in enumerate(bodies):
             T_bin_body = T_bin_tcp @ body.T
             forbidden = np.array(
                 [not self._allowed(w.name, body.name) for w in self._walls.bodies]
             )
             near = self._walls.near_many(*box_around(body.shape, T_bin_body))
             near &= forbidden
-            for row in np.flatnonzero(near.any(axis=1) & ~blocked):
+            for row in np.flatnonzero(near.any(axis=1) & (first < 0)):
                 among = np.flatnonzero(near[row]).tolist()
                 hit = self._walls.touching(body.shape, T_bin_body[row], among)
-                blocked[row] = hit >= 0
-        return blocked
+                if hit >= 0:
+                    first[row] = index
+        return first
 
 
 class _Touches:
