@@ -82,6 +82,13 @@ def _lines(answer: CellCheck, *, verbose: bool) -> Iterator[str]:
     )
     frames, grasps = f"{answer.test_frames:,}", f"{answer.test_grasps:,}"
     yield f"scans   {frames} test frames, {grasps} test grasps"
+    if answer.below_rim_m > 0:
+        yield (
+            f"approach  {answer.approach_m:g} m, begins up to {answer.below_rim_m:g} m "
+            "below the rim (bin_scan.approach_distance_m: clear_rim begins above it)"
+        )
+    else:
+        yield f"approach  {answer.approach_m:g} m, begins above the rim"
     yield from (f"warning: {warning}" for warning in answer.warnings)
     yield f"scan configuration  {'INVALID' if answer.problems else 'valid'}"
     yield from (f"  {problem}" for problem in answer.problems)

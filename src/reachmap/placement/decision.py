@@ -24,6 +24,7 @@ from reachmap.placement.predicted.places import apart_m, rank_key
 from reachmap.placement.problem import Question
 from reachmap.placement.scan_choice import FINALISTS, ScanChoice, choose_scan
 from reachmap.placement.steadying import worst_of
+from reachmap.sampling.frames import approach_distance_m
 from reachmap.scans.ik_survey import survey_frames
 
 NO_ROW = -1
@@ -167,7 +168,7 @@ def why_no_place(question: Question, decision: Decision) -> str:
         return ""
     sample = sample_of(question.loaded.cell, THIN, question.is_open)
     placed = PlacedScene(question.moving, best.pose, sample)
-    approach_m = question.loaded.cell.bin_scan.approach_distance_m
+    approach_m = approach_distance_m(question.loaded.cell)
     survey = survey_frames(placed.scene, placed.T, approach_m)
     status = survey.status.copy()
     status[status == Status.NOT_ATTEMPTED] = Status.NO_PATH_FOUND

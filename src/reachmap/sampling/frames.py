@@ -8,7 +8,11 @@ import numpy as np
 
 from reachmap._typing import FloatArray, IntArray
 from reachmap.cell.model.cell import Cell
-from reachmap.geometry import quaternion_wxyz_from_rotation, transform_from_parts
+from reachmap.geometry import (
+    AXES,
+    quaternion_wxyz_from_rotation,
+    transform_from_parts,
+)
 from reachmap.sampling.lattice import Lattice, cube_lattice
 from reachmap.sampling.orientations import orientation_set, reference_rotation
 
@@ -161,6 +165,39 @@ def bin_test_frames(cell: Cell, T_base_bin: FloatArray) -> BinFrames:
         orientations=R_base_reference @ R_reference_tcp,
     )
     return BinFrames(layer=layer, y=y, x=x, frames=frames)
+
+
+# How far above the rim an approach begins where it is to clear it [m].
+_ABOVE_RIM_M = 0.01
+# Directions this far from the bin's vertical never clear the rim along themselves.
+_STEEPEST = np.cos(np.deg2rad(75.0))
+
+
+def approach_distance_m(cell: Cell) -> float:
+    """Length of the straight approaches of a cell's bin scan [m]."""
+    distance = cell.bin_scan.approach_distance_m
+    if not isinstance(distance, str):
+        return float(distance)
+    steepness = _steepness(cell)
+    steepness = steepness[steepness > _STEEPEST]
+    if not len(steepness):
+        return 0.0
+    depth_m = cell.bin.inner[2] + _ABOVE_RIM_M - min(cell.bin_scan.layers)
+    return max(0.0, round(float(depth_m / steepness.min()), 6))
+
+
+def below_rim_m(cell: Cell) -> float:
+    """How deep below the rim an approach may begin [m]; negative: all above it."""
+    begins = min(cell.bin_scan.layers) + approach_distance_m(cell) * _steepness(cell)
+    return float(cell.bin.inner[2] - begins.min())
+
+
+def _steepness(cell: Cell) -> FloatArray:
+    """Rise of each orientation's approach, backwards, along the bin's z."""
+    T_base_bin = cell.T_base_bin()
+    column, sign = AXES[cell.robot.tcp.approach_axis]
+    R_base_tcp = bin_test_frames(cell, T_base_bin).frames.orientations
+    return np.asarray(-sign * R_base_tcp[:, :, column] @ T_base_bin[:3, 2])
 
 
 def cell_centres(side: float, count: int) -> FloatArray:

@@ -21,7 +21,7 @@ from reachmap.maps.parts import (
     Margins,
 )
 from reachmap.maps.records import NO_PAIR, freeze
-from reachmap.sampling.frames import bin_test_frames
+from reachmap.sampling.frames import approach_distance_m, bin_test_frames
 from reachmap.scans.document import provenance_from_document
 from reachmap.scans.measured import MEASURED, SECONDS_PER_CHECK
 
@@ -184,7 +184,7 @@ def assemble_bin_map(
         position=grid.frames.points,
         quaternion_wxyz=quaternion.copy(),
         approach_axis=cell.robot.tcp.approach_axis,
-        approach_distance=cell.bin_scan.approach_distance_m,
+        approach_distance=approach_distance_m(cell),
         status=shaped(results.status),
         blocking_pair=shaped(results.blocking_pair),
         n_ik=shaped(results.n_ik),

@@ -18,7 +18,12 @@ from reachmap.core.scene import Scene
 from reachmap.maps.parts import Components
 from reachmap.runtime.job import Stages
 from reachmap.runtime.progress import Progress
-from reachmap.sampling.frames import FrameGrid, FrameList, bin_test_frames
+from reachmap.sampling.frames import (
+    FrameGrid,
+    FrameList,
+    approach_distance_m,
+    bin_test_frames,
+)
 from reachmap.scans.ik_survey import Survey, SurveyContext, survey_in_stages
 from reachmap.scans.rolls import RollGroups
 from reachmap.scans.routes import Routes
@@ -88,7 +93,7 @@ def _survey(
         loaded=scene.loaded,
         with_bin=True,
         grids=(frames,),
-        approach_m=scene.loaded.cell.bin_scan.approach_distance_m,
+        approach_m=approach_distance_m(scene.loaded.cell),
     )
     return survey_in_stages(context, stages, phase)
 

@@ -15,6 +15,7 @@ from reachmap.maps import BinMap, Status, read_placement, read_workspace_map
 from reachmap.runtime.job import Work
 from reachmap.runtime.options import IN_PROCESS, RunOptions
 from reachmap.runtime.run import run_scan
+from reachmap.sampling.frames import approach_distance_m
 from reachmap.scans.bin_roadmap import grasp_grid, roadmap_of
 from reachmap.scans.bin_scan import bin_work, pairs_of_fillings, plan_grasps
 from reachmap.scans.document import checking_settings, scan_document
@@ -161,7 +162,7 @@ def estimate_bin_scan(
     rows = np.random.default_rng(0).permutation(grid.size)[:SAMPLE_GRASPS]
     begin = time.perf_counter()
     survey = survey_frames(
-        scene, grid.transforms_at(rows), loaded.cell.bin_scan.approach_distance_m
+        scene, grid.transforms_at(rows), approach_distance_m(loaded.cell)
     )
     plan_grasps(scene, roadmap_of(scene, survey), range(len(rows)))
     seconds = (time.perf_counter() - begin) / len(rows) * grid.size
@@ -184,5 +185,5 @@ def _settings(scene: Scene) -> dict[str, Any]:
         "repeats": cell.bin_scan.repeats,
         "fill_m": list(cell.bin_scan.layers) if cell.bin_scan.is_filled else None,
         "press_in_m": cell.bin_scan.press_in_m if cell.bin_scan.is_filled else None,
-        "approach_distance_m": cell.bin_scan.approach_distance_m,
+        "approach_distance_m": approach_distance_m(cell),
     }

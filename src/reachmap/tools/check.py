@@ -14,6 +14,7 @@ from reachmap.cell.support import support_of, top_faces
 from reachmap.core.scene import Scene
 from reachmap.geometry import AXES, inverse_transform, tilt_rad
 from reachmap.placement.mapped.imaging import picture_of
+from reachmap.sampling.frames import approach_distance_m, below_rim_m
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -63,6 +64,9 @@ class CellCheck:
         Pairs left out because they were proved never to meet.
     test_frames, test_grasps : int
         Sizes of the two scans.
+    approach_m, below_rim_m : float
+        Length of the straight approaches, and how deep below the rim the deepest of
+        them begins; negative where all begin above it.
     problems : tuple of str
         Why the scan configuration cannot be taken; empty where it can.
     """
@@ -89,6 +93,8 @@ class CellCheck:
     safety_margin_m: float
     test_frames: int
     test_grasps: int
+    approach_m: float
+    below_rim_m: float
     warnings: tuple[str, ...]
     problems: tuple[str, ...]
 
@@ -140,6 +146,8 @@ def check_loaded(loaded: LoadedCell) -> CellCheck:
         safety_margin_m=cell.collision.safety_margin_m,
         test_frames=cell.workspace_scan.count(),
         test_grasps=cell.bin_scan.count(),
+        approach_m=approach_distance_m(cell),
+        below_rim_m=round(below_rim_m(cell), 6),
         warnings=(*loaded.warnings, *_picture(scene)),
         problems=scene.scan_problems(),
     )

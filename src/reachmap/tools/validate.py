@@ -22,6 +22,7 @@ from reachmap.ranking.lookup.ranker import Ranker
 from reachmap.ranking.lookup.settings import CostBasis, RankSettings
 from reachmap.runtime.options import IN_PROCESS, RunOptions
 from reachmap.runtime.progress import Progress
+from reachmap.sampling.frames import approach_distance_m
 from reachmap.tools.options import cell_of_artefact
 from reachmap.tools.prologue import refuse_cell_files
 from reachmap.tools.rank import ListFormat, ranker_of, read_list
@@ -241,7 +242,7 @@ def _facts_of_settings(
         "test_grasps": bin_map.status.size,
         "map_repeats": bin_map.path_found.shape[-1],
         "planner": cell.planner.name,
-        "approach_distance_m": cell.bin_scan.approach_distance_m,
+        "approach_distance_m": approach_distance_m(cell),
         "weights": list(settings.weights),
         "likeness": settings.likeness,
         "neighbours": settings.neighbours,

@@ -18,6 +18,7 @@ from reachmap.runtime.job import Job
 from reachmap.runtime.options import RunOptions
 from reachmap.runtime.progress import Progress
 from reachmap.runtime.run import run
+from reachmap.sampling.frames import approach_distance_m
 from reachmap.scans.ik_survey import Survey, survey_frames
 from reachmap.scans.measured import MEASURED, Meter, attempt_seed
 from reachmap.validation.picks import Picks, tool_poses
@@ -141,7 +142,7 @@ def plan_pick(
     PickResults
         A single row.
     """
-    approach_m = scene.loaded.cell.bin_scan.approach_distance_m
+    approach_m = approach_distance_m(scene.loaded.cell)
     survey = survey_frames(scene, T_base_tcp, approach_m)
     meter = Meter(scene)
     measured = np.full((1, repeats, len(MEASURED)), np.nan)

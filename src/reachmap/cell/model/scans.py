@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Discriminator, Field, Tag, model_validator
 
 from reachmap.cell.model.fields import (
     AngleRange,
@@ -90,6 +90,19 @@ Share = Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)]
 PRESS_IN_M = 0.01
 
 
+CLEAR_RIM: Literal["clear_rim"] = "clear_rim"
+
+
+def _approach_kind(value: object) -> str:
+    return "word" if isinstance(value, str) else "length"
+
+
+Approach = Annotated[
+    Annotated[Height, Tag("length")] | Annotated[Literal["clear_rim"], Tag("word")],
+    Discriminator(_approach_kind),
+]
+
+
 class BinScanSpec(Record):
     """The bin scan: test grasps inside the bin, and the pick they stand for."""
 
@@ -131,8 +144,11 @@ class BinScanSpec(Record):
         description="roadmap: paths branch off a shared network of routes; planner: "
         "the planner searches for each from scratch, as in the paper.",
     )
-    approach_distance_m: Height = Field(
-        0.0, description="Straight approach before the grasp [m]; 0 plans to the pose."
+    approach_distance_m: Approach = Field(
+        0.0,
+        description="Straight approach before the grasp [m]; 0 plans to the pose; "
+        "clear_rim: as long as the deepest and most tilted grasp needs for its "
+        "approach to begin above the rim.",
     )
 
     @property

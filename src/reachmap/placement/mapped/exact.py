@@ -21,6 +21,7 @@ from reachmap.core.planning.roadmap import Goals
 from reachmap.core.scene import Scene
 from reachmap.geometry import yaw_transform
 from reachmap.placement.mapped.sample import Sample
+from reachmap.sampling.frames import approach_distance_m
 
 # Hundreds of poses are compared: a plan has a quarter of the checks that it has for a
 # map, and no second opinion.
@@ -104,7 +105,7 @@ class PlacedScene:
             self.scene.kinematics,
             self.scene.motions,
             cell.robot.tcp.approach_axis,
-            cell.bin_scan.approach_distance_m,
+            approach_distance_m(cell),
         )
         self._survey()
         self._first: _Goals | None = None
