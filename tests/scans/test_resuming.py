@@ -53,7 +53,9 @@ def test_a_workspace_scan_by_roadmap_goes_on(tmp_path, monkeypatch):
     with monkeypatch.context() as change:
         survey = interrupt_after(ik_survey.survey_frames, 5)
         change.setattr(ik_survey, "survey_frames", survey)
-        with pytest.raises(Interrupted, match="0 of 1 units are safe"):
+        with pytest.raises(
+            Interrupted, match="0 of 1 units and 5 of the survey are safe"
+        ):
             workspace_scan("planar-toy", output)
     with read_store(store_path(output)) as entries:
         assert len(entries.results("survey")) == 5

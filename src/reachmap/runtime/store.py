@@ -18,6 +18,7 @@ from reachmap.maps.bytes.publish import NO_ROOM, sync_folder
 from reachmap.runtime.job import Reply
 from reachmap.runtime.journal import (
     MAX_LINE,
+    SURVEY,
     UNITS,
     Entries,
     Header,
@@ -107,7 +108,11 @@ class Store(Entries):
     def safe_text(self, where: str = "") -> str:
         """Say what is in it: ``12 of 40 units are safe in bin.h5.journal``."""
         done, all_units = len(self.results()), len(self._own)
-        return f"{done} of {all_units} units are safe {where or f'in {self.path}'}"
+        survey = len(self.results(SURVEY))
+        more = f" and {survey} of the survey" if survey else ""
+        return (
+            f"{done} of {all_units} units{more} are safe {where or f'in {self.path}'}"
+        )
 
     def _failure(self, error: OSError) -> IncompleteError:
         remedy = "free some space" if error.errno in NO_ROOM else "see to that"
