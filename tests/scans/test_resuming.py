@@ -8,8 +8,8 @@ from reachmap.maps import read_bin_map, read_workspace_map
 from reachmap.runtime.journal import read_store
 from reachmap.runtime.signals import Interrupted
 from reachmap.runtime.store import store_path
+from reachmap.scans import bin_roadmap, ik_survey, workspace_roadmap
 from reachmap.scans import bin_scan as planning
-from reachmap.scans import ik_survey, workspace_roadmap
 from reachmap.tools.bin_scan import bin_scan
 from reachmap.tools.workspace_scan import workspace_scan
 
@@ -53,9 +53,7 @@ def test_a_workspace_scan_by_roadmap_goes_on(tmp_path, monkeypatch):
     with monkeypatch.context() as change:
         survey = interrupt_after(ik_survey.survey_frames, 5)
         change.setattr(ik_survey, "survey_frames", survey)
-        with pytest.raises(
-            Interrupted, match="0 of 1 units and 5 of the survey are safe"
-        ):
+        with pytest.raises(Interrupted, match="0 of 1 units and 5 before are"):
             workspace_scan("planar-toy", output)
     with read_store(store_path(output)) as entries:
         assert len(entries.results("survey")) == 5
@@ -82,7 +80,7 @@ def test_a_bin_scan_goes_on_in_its_survey(tmp_path, monkeypatch):
             bin_scan(None, output, cell="planar-toy", overrides=SMALL)
     with monkeypatch.context() as change:
         change.setattr(ik_survey, "survey_frames", never)
-        change.setattr(planning, "connect_survey", never)
+        change.setattr(bin_roadmap, "connect_survey", never)
         bin_scan(None, output, cell="planar-toy", overrides=SMALL)
     whole, resumed = (read_bin_map(tmp_path / name) for name in ("whole.h5", "b.h5"))
     assert resumed.stamp.content_sha256 == whole.stamp.content_sha256

@@ -36,8 +36,8 @@ from reachmap.runtime.job import Measure
 
 UNITS = "units"
 """Phase of the units that become the artefact."""
-SURVEY = "survey"
-"""Phase of what has to be known of all frames before them."""
+PUBLISHED = "published"
+"""Phase of notes on what a run has put in place of its output."""
 MAX_UNITS = 100_000_000
 MAX_LINE = 256 * 1024 * 1024
 PREFIX = 9  # eight digits and a space

@@ -25,16 +25,13 @@ from reachmap.maps import RunClock, RunInfo, check_output
 from reachmap.runtime.encoding import decode, encode
 from reachmap.runtime.executors import open_pool
 from reachmap.runtime.job import Job, Measure, Reply, Work, engine_versions, one_frame
-from reachmap.runtime.journal import UNITS, Header
+from reachmap.runtime.journal import PUBLISHED, UNITS, Header
 from reachmap.runtime.options import RunOptions
 from reachmap.runtime.pool import Pool
 from reachmap.runtime.progress import Progress
 from reachmap.runtime.results import Results, last_line
 from reachmap.runtime.signals import Interrupted, StopRequest, stop_signals
 from reachmap.runtime.store import Store, open_store, store_path
-
-PUBLISHED = "published"
-"""Phase of notes on what this run has put in place of the output."""
 
 log = logging.getLogger(__name__)
 

@@ -18,7 +18,6 @@ from reachmap.maps.bytes.publish import NO_ROOM, sync_folder
 from reachmap.runtime.job import Reply
 from reachmap.runtime.journal import (
     MAX_LINE,
-    SURVEY,
     UNITS,
     Entries,
     Header,
@@ -106,7 +105,7 @@ class Store(Entries):
         self.path.unlink(missing_ok=True)
 
     def safe_text(self, where: str = "") -> str:
-        """Say what is in it: ``12 of 40 units are safe in bin.h5.journal``."""
+        """Say what is in it: ``12 of 40 units and 9 before are safe in b.journal``."""
         done, all_units = len(self.results()), len(self._own)
         survey = len(self.results(SURVEY))
         more = f" and {survey} of the survey" if survey else ""
