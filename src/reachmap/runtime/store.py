@@ -107,11 +107,11 @@ class Store(Entries):
     def safe_text(self, where: str = "") -> str:
         """Say what is in it: ``12 of 40 units and 9 before are safe in b.journal``."""
         done, all_units = len(self.results()), len(self._own)
-        survey = len(self.results(SURVEY))
-        more = f" and {survey} of the survey" if survey else ""
-        return (
-            f"{done} of {all_units} units{more} are safe {where or f'in {self.path}'}"
+        first = sum(1 for phase, _ in self._records if phase not in (UNITS, PUBLISHED))
+        units = f"{done} of {all_units} units" + (
+            f" and {first} before" if first else ""
         )
+        return f"{units} are safe {where or f'in {self.path}'}"
 
     def _failure(self, error: OSError) -> IncompleteError:
         remedy = "free some space" if error.errno in NO_ROOM else "see to that"
