@@ -18,6 +18,7 @@ from reachmap.maps.bytes.publish import NO_ROOM, sync_folder
 from reachmap.runtime.job import Reply
 from reachmap.runtime.journal import (
     MAX_LINE,
+    PUBLISHED,
     UNITS,
     Entries,
     Header,
