@@ -20,6 +20,7 @@ from reachmap._typing import FloatArray
 from reachmap.cell.loading import LoadedCell, cell_from_json
 from reachmap.core.scene import Scene
 from reachmap.maps import BinMap, read_bin_map
+from reachmap.maps.summary.directions import reachability_of_directions
 from reachmap.maps.summary.emptying import emptying_of
 from reachmap.sampling.frames import bin_test_frames
 from reachmap.scans.ik_survey import survey_frames
@@ -90,7 +91,10 @@ def main() -> None:
     found = emptying_of(record)
     assert found is not None
     heights = [level.height_m for level in found.levels]
-    curve = [level.directions for level in found.levels]
+    # Parts lie anywhere between the outermost points, which stand for half as much.
+    directions = reachability_of_directions(record)[0]
+    wide = np.trapezoid(directions, record.x) / np.ptp(record.x)
+    curve = np.trapezoid(wide, record.y) / np.ptp(record.y)
     gaps = []
     for heap in range(heaps):
         rng = np.random.default_rng(100 + heap)
