@@ -18,7 +18,10 @@ def command(as_json: bool) -> None:
     also walls, bottom, rim, where the figures are published, and which of them are
     derived.
 
-    Example: reachmap check ur10-eye-in-hand --set bin.carrier=KLT-6147
+    \b
+    Example:
+      reachmap carriers
+      reachmap check ur10-eye-in-hand --set bin.carrier=KLT-6147
     """
     from reachmap.tools.carriers import list_carriers
 
