@@ -216,6 +216,8 @@ def _lines(placement: BinPlacement, output: Path, top: int) -> Iterator[str]:
         if facts is not None:
             yield _row_text(facts, roles.get(row, ""))
     facts = placement_facts(placement)
+    if facts["figure"] == "directions":
+        yield "score: reachability of directions, since the tool's roll does not matter"
     if placement.margin:
         yield "margin (score within 5 points): " + _margin_text(facts)
     yield from _stand(facts)

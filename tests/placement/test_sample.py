@@ -8,10 +8,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from reachmap.cell.loading import read_cell
+from reachmap.core.scene import Scene
+from reachmap.placement.mapped.exact import PlacedScene
 from reachmap.placement.mapped.sample import (
     COARSE,
+    MOST_ROLLS,
     frames_in_bin,
     open_frames,
+    rolls_of,
     sample_of,
     spread_indices,
 )
@@ -181,3 +185,41 @@ def test_a_footprint_averages_what_is_open_around_its_points():
     x, _ = spread_indices(20, 5)
     assert x.tolist() == [0, 3, 9, 16, 19]
     assert np.allclose(footprint.open[6], is_open[0, 1:7, 1:7].mean(axis=(0, 1)))
+
+
+def test_where_the_roll_is_free_a_direction_counts_with_any_roll():
+    """Frames of the sample that have a free configuration, by trying every roll."""
+    scene = scene_of("ur5-eye-in-hand", "tool.roll=free", with_bin=False)
+    loaded = scene.loaded
+    rolls = rolls_of(loaded.cell)
+    assert len(rolls) == MOST_ROLLS
+    listed = frames_in_bin(scene_of("ur5-eye-in-hand", with_bin=False).loaded.cell)
+    free = frames_in_bin(loaded.cell)
+    down = np.unique(np.round(listed.orientations[:, :, 2], 6), axis=0)
+    assert free.shape[-1] == len(down) < listed.shape[-1]
+    is_open = open_frames(scene.robot, loaded)
+    sample = sample_of(loaded.cell, (3, 2, 3), is_open)
+    moving = Scene.build(loaded, with_bin=True, bin_moves=True)
+    placed = PlacedScene(moving, (0.5, 0.0, 0.0, 1.57), sample)
+    wanted = []
+    for k, T in enumerate(placed.T):
+        branches = [placed.scene.kinematics.solve(T @ roll) for roll in rolls]
+        if any(placed.scene.checker.is_free(q) for Q in branches for q in Q):
+            wanted.append(k)
+    assert sorted(set(placed.frame.tolist())) == wanted
+
+
+def test_rolls_turn_about_the_approach_axis():
+    """The approach direction stays; listed rolls are left alone."""
+    for axis, column in (("+z", 2), ("-x", 0)):
+        changes = ("tool.roll=4-fold", f"robot.tcp.approach_axis={axis}")
+        rolls = rolls_of(read_cell("ur5-eye-in-hand", changes).cell)
+        assert len(rolls) == 4
+        np.testing.assert_allclose(rolls[:, column, column], 1.0)
+        angles = np.degrees(
+            np.arccos((np.trace(rolls[:, :3, :3], axis1=1, axis2=2) - 1) / 2)
+        )
+        assert angles == pytest.approx([0, 90, 180, 90])
+    np.testing.assert_array_equal(
+        rolls_of(read_cell("ur5-eye-in-hand").cell), np.eye(4)[None]
+    )

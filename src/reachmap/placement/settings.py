@@ -21,6 +21,7 @@ def placement_settings() -> dict[str, Any]:
             "quick": list(sample.QUICK),
         },
         "max_layers": sample.MAX_LAYERS,
+        "most_rolls": sample.MOST_ROLLS,
         "share_of_checks": exact.SHARE_OF_CHECKS,
         "steps_per_square": places.STEPS_PER_SQUARE,
         "yaw_step_deg": places.YAW_STEP_DEG,

@@ -18,6 +18,7 @@ def placement_facts(placement: BinPlacement) -> dict[str, Any]:
     -------
     dict
         ``rule``, ``chosen``, ``runner_up``, ``paper`` (rows, or None), ``margin``,
+        ``figure`` ("frames", or "directions" where the roll does not matter),
         ``scan_configuration``, counts of candidates, and ``tool_limit_percent``, the
         share of test grasps that the tool itself can take in this bin, with the body
         that is in the way and what 20 mm of a dimension would give back [points].
@@ -48,7 +49,7 @@ def placement_facts(placement: BinPlacement) -> dict[str, Any]:
         "candidates": len(placement.reason),
         "mapped_with_bin": int((placement.exact > 0).sum()),
         "excluded": excluded,
-        "figure": "path reachability of test grasps, every roll for itself",
+        "figure": settings.get("figure", "frames"),
         **{name: settings.get(name) for name in TOOL_LIMIT},
     }
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from reachmap._typing import BoolArray, FloatArray
+from reachmap.cell.model.tool import LISTED
 from reachmap.cell.support import TopFace, top_faces
 from reachmap.core.collision.bin_fit import BinFit
 from reachmap.core.collision.camera import Camera
@@ -73,6 +74,8 @@ __all__ = [
     "row_facts",
 ]
 
+# What is scored, with rolls as they are listed and where they do not matter.
+FIGURES = ("frames", "directions")
 RULES = ("search", "paper")
 
 
@@ -308,6 +311,7 @@ def _record(
                 "limits": {k: list(v) for k, v in choice.limits.items()},
                 "fixed": dict(choice.fixed),
                 "scan_configuration": "new" if outcome.scan.is_new else "kept",
+                "figure": FIGURES[placed.cell.tool.roll != LISTED],
                 "tool_limit_percent": round(limit.percent, 2),
                 "tool_limit_body": limit.body,
                 "tool_limit_gains": limit.gains,

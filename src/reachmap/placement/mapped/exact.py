@@ -20,7 +20,7 @@ from reachmap.core.planning.connection import Connection, connect
 from reachmap.core.planning.roadmap import Goals
 from reachmap.core.scene import Scene
 from reachmap.geometry import yaw_transform
-from reachmap.placement.mapped.sample import Sample
+from reachmap.placement.mapped.sample import Sample, rolls_of
 from reachmap.sampling.frames import approach_distance_m
 
 # Hundreds of poses are compared: a plan has a quarter of the checks that it has for a
@@ -86,7 +86,7 @@ class PlacedScene:
     pose : (x, y, z [m], yaw [rad])
     scene : Scene
     T : array, shape (frames, 4, 4)
-        T_base_tcp.
+        T_base_tcp; where rolls do not matter, of the first roll.
     Q : array, shape (branches, dof)
         Free configurations of all frames, those nearest to the cell's own scan
         configuration first in each frame [rad].
@@ -100,6 +100,9 @@ class PlacedScene:
         self.scene = scene.with_bin_of(changed)
         cell = changed.cell
         self.T = self.scene.T_base_bin @ sample.T_bin_tcp
+        rolls = rolls_of(cell)
+        self._rolled = (self.T[:, None] @ rolls).reshape(-1, 4, 4)
+        self._rolls = len(rolls)
         self._sample = sample
         self._approach = StraightApproach(
             self.scene.kinematics,
@@ -112,15 +115,17 @@ class PlacedScene:
 
     def _survey(self) -> None:
         scene = self.scene
-        Q, frame = scene.kinematics.solve_many(
-            self.T, windings=False, near=scene.scan_configuration
+        Q, rolled = scene.kinematics.solve_many(
+            self._rolled, windings=False, near=scene.scan_configuration
         )
+        frame = rolled // self._rolls
         self._has_ik = np.bincount(frame, minlength=len(self.T)) > 0
         free = scene.checker.free_mask(Q)
-        Q, frame = Q[free], frame[free]
+        Q, frame, rolled = Q[free], frame[free], rolled[free]
         away = np.round(np.linalg.norm(Q - scene.scan_configuration, axis=1), 9)
         order = np.lexsort((away, frame))
         self.Q, self.frame = Q[order], frame[order]
+        self._row = rolled[order]
         self._begin = np.searchsorted(self.frame, np.arange(len(self.T) + 1))
 
     @property
@@ -196,7 +201,7 @@ class PlacedScene:
         """Look at the next branch of a frame; True if its approach is free."""
         row = int(goals.tried[k])
         goals.tried[k] += 1
-        way = self._approach.of(self.T[k], self.Q[row])
+        way = self._approach.of(self._rolled[self._row[row]], self.Q[row])
         if way is None or (len(way) > 1 and not self._approach.is_free(way)):
             return False
         goals.way.append(way)

@@ -14,11 +14,15 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from reachmap._typing import BoolArray, FloatArray, IntArray
 from reachmap.cell.model.cell import Cell
+from reachmap.cell.model.tool import LISTED
 from reachmap.core.collision.bin_fit import ToolFit
+from reachmap.geometry import AXES, transform_from_parts
 from reachmap.sampling.frames import FrameGrid, bin_test_frames
+from reachmap.scans.rolls import RollGroups
 
 if TYPE_CHECKING:
     from reachmap.cell.loading import LoadedCell
@@ -30,6 +34,8 @@ COARSE: Grid = (8, 6, 3)
 THIN: Grid = (6, 5, 3)
 QUICK: Grid = (4, 3, 3)
 MAX_LAYERS = 3
+# Rolls that are tried where any will do: a scan may try more of them.
+MOST_ROLLS = 8
 LEAST_ORIENTATIONS = 4
 
 
@@ -85,7 +91,8 @@ class Sample:
 def frames_in_bin(cell: Cell) -> FrameGrid:
     """All test frames of a cell in the bin frame, (layers, y, x, orientations).
 
-    Of many layers the lowest, the middle and the highest are kept.
+    Of many layers the lowest, the middle and the highest are kept; of orientations
+    that differ by a roll that does not matter, the first.
     """
     T_base_bin = cell.T_base_level()
     R_base_bin, p_base_bin = T_base_bin[:3, :3], T_base_bin[:3, 3]
@@ -95,7 +102,26 @@ def frames_in_bin(cell: Cell) -> FrameGrid:
         orientations=R_base_bin.T @ in_base.orientations,
     )
     points = frames.points[kept_layers(len(frames.points))]
-    return FrameGrid(points=points, orientations=frames.orientations)
+    orientations = frames.orientations
+    if cell.tool.roll != LISTED:
+        one_point = FrameGrid(points=points[:1, :1, :1], orientations=orientations)
+        axis = cell.robot.tcp.approach_axis
+        groups = RollGroups.of(one_point, axis, cell.tool).group
+        orientations = orientations[np.unique(groups, return_index=True)[1]]
+    return FrameGrid(points=points, orientations=orientations)
+
+
+def rolls_of(cell: Cell) -> FloatArray:
+    """Rolls about the approach axis that will do, as T_tcp_rolled, shape (n, 4, 4).
+
+    The identity where rolls are as listed; of many that are free, a few.
+    """
+    axis, sign = AXES[cell.robot.tcp.approach_axis]
+    turns = 2.0 * np.pi * np.arange(min(cell.tool.count(), MOST_ROLLS))
+    about = np.zeros((len(turns), 3))
+    about[:, axis] = sign * turns / len(turns)
+    R = Rotation.from_rotvec(about).as_matrix()
+    return transform_from_parts(R, np.zeros(3))
 
 
 def kept_layers(count: int) -> list[int]:
@@ -110,7 +136,8 @@ def open_frames(robot: RobotModel, loaded: LoadedCell) -> BoolArray:
     fill the bin are in the way of the tool as its walls are.
     """
     frames, cell = frames_in_bin(loaded.cell), loaded.cell
-    T = frames.transforms()
+    rolls = rolls_of(cell)
+    T = frames.transforms()[..., None, :, :] @ rolls
     layers = kept_layers(len(cell.bin_scan.layers))
     if not cell.bin_scan.is_filled:
         blocked = ToolFit(robot, loaded).blocked(T.reshape(-1, 4, 4))
@@ -121,7 +148,7 @@ def open_frames(robot: RobotModel, loaded: LoadedCell) -> BoolArray:
                 for layer, rows in zip(layers, T, strict=True)
             ]
         )
-    return np.asarray(~blocked.reshape(frames.shape))
+    return np.asarray(~blocked.reshape(*frames.shape, len(rolls)).all(axis=-1))
 
 
 def sample_of(cell: Cell, grid: Grid, is_open: BoolArray) -> Sample:
