@@ -33,7 +33,9 @@ help: ## Show this list
 run: $(RESULTS) ## Install, then scan, place, scan and rank on the shipped cell (default)
 	@echo "Done. Open $(RUN)/report.html, $(RUN)/pictures and $(RUN)/ranked.json."
 
-paper: run ## The experiment of the paper at its full sizes, which is the default
+paper: ## The experiment of the paper: its sizes, five searches to each listed orientation
+	@$(MAKE) --no-print-directory run \
+	    SIZE="--set bin_scan.attempts=planner --set tool.roll=listed"
 
 quick: ## The same with fewer test grasps and attempts, into run/quick
 	@$(MAKE) --no-print-directory run RUN=run/quick SIZE="$(QUICK)"
