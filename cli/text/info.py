@@ -95,7 +95,7 @@ def _workspace_lines(summary: WorkspaceSummary) -> list[str]:
         *fact_lines(
             [
                 ("reached", _evidence_text(summary.reached)),
-                ("not reached", _evidence_text(summary.unreached)),
+                ("not reached", _verdict_text(summary.unreached)),
             ]
         ),
     ]
@@ -123,15 +123,20 @@ def _evidence_text(evidence: EvidenceSummary) -> str:
 
 
 def _checks_text(evidence: EvidenceSummary) -> str:
-    """State checks by method, and how often an independent method was of one mind."""
+    """State checks, by method."""
     if evidence.checks is None:
         return ""
     methods = ", ".join(f"{n} {count:,}" for n, count in evidence.method_checks.items())
-    text = f", {evidence.checks:,} state checks" + (f" ({methods})" if methods else "")
-    return (
-        f"{text}; an independent method agrees on {evidence.agreed} of "
-        f"{plural(evidence.frames, 'frame')}"
-    )
+    return f", {evidence.checks:,} state checks" + (f" ({methods})" if methods else "")
+
+
+def _verdict_text(evidence: EvidenceSummary) -> str:
+    """Evidence of frames without a path, and how often another method agreed."""
+    text = _evidence_text(evidence)
+    if evidence.checks is None or not evidence.frames:
+        return text
+    agreed = f"{evidence.agreed} of {plural(evidence.frames, 'frame')}"
+    return f"{text}; an independent method agrees on {agreed}"
 
 
 def _cause_lines(causes: Causes) -> list[str]:
@@ -230,7 +235,7 @@ def _emptying_lines(emptying: Emptying | None) -> list[str]:
 def _unreached_lines(evidence: EvidenceSummary | None) -> list[str]:
     if evidence is None or not evidence.frames:
         return []
-    return ["", "Evidence", *fact_lines([("no path", _evidence_text(evidence))])]
+    return ["", "Evidence", *fact_lines([("no path", _verdict_text(evidence))])]
 
 
 def reliability_lines(reliability: Mapping[str, Reliability]) -> list[str]:
