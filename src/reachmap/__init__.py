@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from reachmap.tools.verify import verify
     from reachmap.tools.workspace_scan import workspace_scan
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 _HOMES: Final[dict[str, str]] = {
     "BinMap": "maps.records",
