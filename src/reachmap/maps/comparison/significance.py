@@ -1,9 +1,12 @@
-"""Is a change more than chance: exact tests for shares of frames."""
+"""Is a change more than chance: exact tests for shares of frames.
+
+SciPy's statistics are imported where they are used: readers of maps come by here, and
+a ranking has no time for them.
+"""
 
 from __future__ import annotations
 
 import numpy as np
-from scipy import stats
 
 from reachmap._typing import BoolArray, FloatArray, IntArray
 
@@ -22,6 +25,8 @@ def mcnemar_exact(gained: int, lost: int) -> float:
     >>> mcnemar_exact(0, 0), mcnemar_exact(5, 0)
     (1.0, 0.0625)
     """
+    from scipy import stats
+
     changed = gained + lost
     return float(stats.binomtest(gained, changed).pvalue) if changed else 1.0
 
@@ -60,6 +65,8 @@ def paired_means(difference: FloatArray) -> tuple[float, float, float, float]:
     error = float(difference.std(ddof=1)) / np.sqrt(n)
     if error == 0.0:
         return mean, mean, mean, float(mean == 0.0)
+    from scipy import stats
+
     half = float(stats.t.ppf(0.975, n - 1)) * error
     p_value = 2.0 * float(stats.t.sf(abs(mean) / error, n - 1))
     return mean, mean - half, mean + half, p_value
@@ -80,6 +87,8 @@ def fisher_exact(
     array, shape (n,)
         1 where nothing was tried.
     """
+    from scipy import stats
+
     tables = np.stack([hits_a, total_a - hits_a, hits_b, total_b - hits_b], axis=-1)
     # Squares of a map share few tables.
     different, place = np.unique(tables, axis=0, return_inverse=True)
@@ -107,6 +116,8 @@ def benjamini_hochberg(p_values: FloatArray, rate: float = 0.05) -> BoolArray:
     >>> benjamini_hochberg(np.array([0.001, 0.04, 0.2, 0.02])).tolist()
     [True, False, False, True]
     """
+    from scipy import stats
+
     if not len(p_values):
         return np.zeros(0, bool)
     return np.asarray(stats.false_discovery_control(p_values) <= rate)

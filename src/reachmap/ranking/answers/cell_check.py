@@ -13,11 +13,15 @@ from reachmap.errors import MapFileError
 from reachmap.maps.records import BinMap
 
 # How a cell is scanned and where its bin stands: stages of the pipeline change these.
+# What parameters lead to stands where it is used.
 NOT_THE_CELL: Final = (
+    "parameters",
+    "expressions",
     "scan_configuration",
     "workspace_scan",
     "bin_scan",
     "planner",
+    "roadmap",
     "placement",
     "seed",
 )
