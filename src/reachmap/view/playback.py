@@ -16,6 +16,7 @@ from reachmap.core.planning.timing import (
 from reachmap.core.robot.model import RobotModel
 from reachmap.errors import SettingsError
 from reachmap.maps.records import BinMap
+from reachmap.motions.motion import trapezoid
 from reachmap.view.points import shortest_paths
 
 FRAMES_PER_S = 24.0
@@ -118,16 +119,7 @@ def _eased(
         ramp_s = (velocity / change).min() / (acceleration / change).min()
     # Share of the time spent on each ramp; one half is a triangle.
     ramp = float(np.clip(ramp_s / max(time_s, 1e-9), 0.01, 0.5))
-    top = 1.0 / (1.0 - ramp)
-    share = np.where(
-        steps < ramp,
-        0.5 * top * steps**2 / ramp,
-        np.where(
-            steps > 1.0 - ramp,
-            1.0 - 0.5 * top * (1.0 - steps) ** 2 / ramp,
-            top * (steps - 0.5 * ramp),
-        ),
-    )
+    share, _ = trapezoid(steps, ramp)
     place = share * (len(way) - 1)
     knots = np.arange(len(way))
     points = np.stack([np.interp(place, knots, column) for column in way.T], axis=-1)

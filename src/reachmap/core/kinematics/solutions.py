@@ -6,6 +6,8 @@ rows of one frame side by side.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from reachmap._typing import BoolArray, FloatArray, IntArray
@@ -40,6 +42,17 @@ def joined(tables: list[Rows], dof: int) -> Rows:
     frame = np.concatenate([np.zeros(0, np.int64), *(table[1] for table in tables)])
     order = np.argsort(frame, kind="stable")
     return Q[order], frame[order]
+
+
+def in_blocks(
+    solve: Callable[[FloatArray], Rows], T: FloatArray, size: int, dof: int
+) -> Rows:
+    """Solve poses (n, 4, 4) a block at a time, which bounds the memory."""
+    tables = []
+    for start in range(0, len(T), size):
+        Q, frame = solve(T[start : start + size])
+        tables.append((Q, frame + start))
+    return joined(tables, dof)
 
 
 def distinct(rows: Rows, is_revolute: BoolArray) -> Rows:

@@ -14,6 +14,7 @@ from reachmap.core.kinematics.solutions import (
     Rows,
     can_be_within,
     distinct,
+    in_blocks,
     joined,
     turned_into,
     wrapped,
@@ -100,11 +101,7 @@ class NumericSolver:
         T : array, shape (n, 4, 4)
             Poses T_base_tcp.
         """
-        tables = []
-        for start in range(0, len(T), _BLOCK):
-            Q, frame = self._block(T[start : start + _BLOCK])
-            tables.append((Q, frame + start))
-        return joined(tables, self._chain.dof)
+        return in_blocks(self._block, T, _BLOCK, self._chain.dof)
 
     def _block(self, T: FloatArray) -> Rows:
         rows, missed = self._round(T, self._count)

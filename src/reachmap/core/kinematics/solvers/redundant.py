@@ -26,6 +26,7 @@ from reachmap.core.kinematics.solutions import (
     Rows,
     can_be_within,
     distinct,
+    in_blocks,
     joined,
     wrapped,
 )
@@ -120,11 +121,7 @@ class RedundantSolver:
         T : array, shape (n, 4, 4)
             Poses T_base_tcp.
         """
-        tables = []
-        for start in range(0, len(T), _BLOCK):
-            Q, frame = self._block(T[start : start + _BLOCK])
-            tables.append((Q, frame + start))
-        return joined(tables, self._chain.dof)
+        return in_blocks(self._block, T, _BLOCK, self._chain.dof)
 
     def share_on_grid(self) -> float:
         """Share of random poses that have a solution at a value of the grid.
