@@ -7,13 +7,13 @@ import pytest
 
 from reachmap.core.collision.solids import SolidCell
 from reachmap.errors import SettingsError
+from reachmap.motions.motion import way_points
 from reachmap.tools.options import cell_of_artefact
 from reachmap.view.playback import (
     Playback,
     choose_paths,
     find_path,
     playback_of,
-    way_points,
 )
 from reachmap.view.points import shortest_paths
 from tests.support.synthetic_maps import synthetic_bin_map

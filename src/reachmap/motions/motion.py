@@ -93,12 +93,8 @@ def motion_of(
     velocity, acceleration : array, shape (dof,)
         Limits [rad/s], [rad/s²].
     """
-    paths = bin_map.paths
-    begin = int(paths.row_size[:row].sum())
-    path = paths.configuration[begin : begin + int(paths.row_size[row])]
-    split = int(paths.planned_size[row])
-    corners = merge_straight(path[:split]) if split > 1 else path[:split]
-    way = path[split - 1 :]
+    planned, way = way_points(bin_map, row)
+    corners = merge_straight(planned) if len(planned) > 1 else planned
     times = np.concatenate(
         [[0.0], np.cumsum(segment_times_s(corners, velocity, acceleration))]
     )
@@ -110,13 +106,25 @@ def motion_of(
         times = np.concatenate([times, reached])
         stages += (APPROACH,) * (len(way) - 1)
         configuration = np.concatenate([corners, way[1:]])
-    layer, y, x, orientation = (int(k) for k in paths.index[row][:4])
+    layer, y, x, orientation = (int(k) for k in bin_map.paths.index[row][:4])
     return Motion(
         test_grasp=(layer, y, x, orientation),
         configuration=configuration,
         stage=stages,
         time_s=times,
     )
+
+
+def way_points(record: BinMap, row: int) -> tuple[FloatArray, FloatArray]:
+    """Way-points of a stored path: the planned part, and the straight approach.
+
+    The last of the first is the first of the second.
+    """
+    paths = record.paths
+    start = int(paths.row_size[:row].sum())
+    path = paths.configuration[start : start + int(paths.row_size[row])]
+    planned = int(paths.planned_size[row])
+    return path[:planned], path[planned - 1 :]
 
 
 def best_rows(bin_map: BinMap) -> dict[tuple[int, int, int, int], int]:

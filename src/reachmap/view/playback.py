@@ -16,7 +16,7 @@ from reachmap.core.planning.timing import (
 from reachmap.core.robot.model import RobotModel
 from reachmap.errors import SettingsError
 from reachmap.maps.records import BinMap
-from reachmap.motions.motion import trapezoid
+from reachmap.motions.motion import trapezoid, way_points
 from reachmap.view.points import shortest_paths
 
 FRAMES_PER_S = 24.0
@@ -43,18 +43,6 @@ class Playback:
     time_s: FloatArray
     grasp: int
     test_grasp: tuple[int, int, int, int]
-
-
-def way_points(record: BinMap, row: int) -> tuple[FloatArray, FloatArray]:
-    """Way-points of a stored path: the planned part, and the straight approach.
-
-    The last of the first is the first of the second.
-    """
-    paths = record.paths
-    start = int(paths.row_size[:row].sum())
-    path = paths.configuration[start : start + int(paths.row_size[row])]
-    planned = int(paths.planned_size[row])
-    return path[:planned], path[planned - 1 :]
 
 
 def playback_of(record: BinMap, row: int, robot: RobotModel) -> Playback:
