@@ -321,6 +321,18 @@ list_options = compose(
         help="Weight of the distance between grasp and test grasp.",
     ),
     click.option(
+        "--margin",
+        "margins",
+        type=(
+            click.Choice(["clearance", "joint_margin", "singularity", "wind_up"]),
+            float,
+        ),
+        multiple=True,
+        metavar="NAME μ",
+        help="Weight of what the path leaves: clearance, joint_margin or singularity, "
+        "or of wind_up, how far it turns the last joint. Repeatable.",
+    ),
+    click.option(
         "--normalise",
         type=click.Choice(["quantile", "max"]),
         default="quantile",

@@ -81,6 +81,7 @@ def command(
     output: Path | None,
     weights: tuple[float, float, float],
     likeness: float,
+    margins: tuple[tuple[str, float], ...],
     normalise: Literal["quantile", "max"],
     planning_time: Literal["checks", "measured"],
     neighbours: int,
@@ -126,6 +127,7 @@ def command(
         settings=RankSettings(
             weights=weights,
             likeness=likeness,
+            margins=dict(margins),
             neighbours=neighbours,
             roll=roll,
             max_angle_deg=max_angle,

@@ -67,6 +67,7 @@ def command(
     top: int,
     weights: tuple[float, float, float],
     likeness: float,
+    margins: tuple[tuple[str, float], ...],
     normalise: Literal["quantile", "max"],
     planning_time: Literal["checks", "measured"],
     max_angle: float | None,
@@ -114,6 +115,7 @@ def command(
         settings=RankSettings(
             weights=weights,
             likeness=likeness,
+            margins=dict(margins),
             neighbours=neighbours,
             roll=roll,
             max_angle_deg=max_angle,

@@ -22,6 +22,7 @@ from reachmap.ranking import (
     OUTSIDE_MAP,
     CostBasis,
     Ranker,
+    RankSettings,
     align,
     rotation_between,
 )
@@ -103,7 +104,7 @@ def test_a_direction_takes_the_cheapest_reachable_roll():
     ranking = RANKER.rank(
         BIN_MAP.position.reshape(-1, 3), np.tile([0, 0, -1.0], (35, 1))
     )
-    cost = RANKER.test_costs((1.0, 1.0, 1.0))
+    cost = RANKER.test_costs(RankSettings())
     # Orientations 0, 1, 2 of the family point straight down, at three rolls.
     np.testing.assert_allclose(ranking.cost, cost[:, :3].min(axis=1))
     assert (ranking.test_grasp[:, 3] < 3).all()
@@ -160,7 +161,7 @@ def test_midway_between_points_the_cheapest_of_the_tied_wins():
     jitter = rng.normal(scale=1e-9, size=(20, 3))
     ranking = ranker.rank(middle + jitter, np.tile([0, 0, -1.0], (20, 1)))
     at = [0, 1, 3, 4]
-    cheapest = ranker.test_costs((1, 1, 1))[at][:, :3].min()
+    cheapest = ranker.test_costs(RankSettings())[at][:, :3].min()
     np.testing.assert_allclose(ranking.cost, cheapest)
     # Equal costs keep their supplied order although the distances differ.
     assert ranking.order.tolist() == list(range(20))

@@ -7,6 +7,7 @@ import pytest
 
 from reachmap.errors import SettingsError
 from reachmap.plots.ranking import CostGroup, ranking_chart
+from reachmap.ranking.lookup.table import TERMS
 
 
 def group(label, supplied):
@@ -30,7 +31,7 @@ def texts(figure):
 def test_bars_are_stacked_means():
     """Three segments a bar, one on the other, whose heights are the mean terms."""
     terms = [[0.4, 0.2, 0.1], [0.2, 0.2, 0.3], [0.9, 0.9, 0.9]]
-    figure = ranking_chart([group("NE", terms)], top=2)
+    figure = ranking_chart([group("NE", terms)], TERMS, top=2)
     drawn = bars(figure)
     assert len(drawn) == 6
     np.testing.assert_allclose([h for _, h, _ in drawn[:3]], [0.3, 0.2, 0.2])
@@ -41,7 +42,7 @@ def test_bars_are_stacked_means():
 def test_unreachable_grasps_are_counted_and_grey():
     """A mean over an unreachable grasp is infinite: grey to the top, with the count."""
     terms = [[0.4, 0.2, 0.1], [np.nan] * 3, [0.2, 0.2, 0.3]]
-    figure = ranking_chart([group("SW", terms)], top=2)
+    figure = ranking_chart([group("SW", terms)], TERMS, top=2)
     drawn = bars(figure)
     assert len(drawn) == 7
     assert drawn[0][1] == pytest.approx(figure.axes[0].get_ylim()[1])
@@ -52,7 +53,9 @@ def test_unreachable_grasps_are_counted_and_grey():
 
 def test_a_group_without_reachable_grasps():
     """Nothing is averaged and nothing divided by zero."""
-    figure = ranking_chart([group("NW", [[np.nan] * 4] * 3)], top=10)
+    figure = ranking_chart(
+        [group("NW", [[np.nan] * 4] * 3)], (*TERMS, "clearance"), top=10
+    )
     assert texts(figure).count("3 of 3\nunreachable") == 2
     assert "NW (only 3)" in texts(figure)
 
@@ -66,4 +69,4 @@ def test_charts_that_cannot_be_drawn():
         ([one] * 25, 10, "25 groups; a chart takes 24"),
     ]:
         with pytest.raises(SettingsError, match=message):
-            ranking_chart(groups, top)
+            ranking_chart(groups, TERMS, top)

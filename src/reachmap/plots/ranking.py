@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -25,8 +25,16 @@ from reachmap.plots.parts.style import (
     put_title,
 )
 
-TERM_LABELS: Final = ("path length", "planning time", "execution time", "likeness")
-TERM_COLOURS: Final = ("#2f6db3", "#e69f00", "#3d9970", "#9467bd")
+TERM_COLOURS: Final[Mapping[str, str]] = {
+    "path_length": "#2f6db3",
+    "planning_time": "#e69f00",
+    "execution_time": "#3d9970",
+    "likeness": "#9467bd",
+    "clearance": "#c44e52",
+    "joint_margin": "#8c6d4f",
+    "singularity": "#5fb0c9",
+    "wind_up": "#a8a13b",
+}
 MAX_GROUPS: Final = 24
 BAR_WIDTH: Final = 0.38
 PLACES: Final = (-0.21, 0.21)
@@ -50,7 +58,11 @@ class CostGroup:
 
 
 def ranking_chart(
-    groups: Sequence[CostGroup], top: int = 10, *, subtitle: str = ""
+    groups: Sequence[CostGroup],
+    names: Sequence[str],
+    top: int = 10,
+    *,
+    subtitle: str = "",
 ) -> Figure:
     """Draw the mean cost of the first grasps in either order, stacked by term.
 
@@ -61,6 +73,8 @@ def ranking_chart(
     Parameters
     ----------
     groups : sequence of CostGroup
+    names : sequence of str, length t
+        Terms in the order of their columns.
     top : int
         How many of the first grasps are averaged.
     subtitle : str
@@ -83,9 +97,9 @@ def ranking_chart(
             for shift, terms in zip(
                 PLACES, (group.supplied, group.ranked), strict=True
             ):
-                _draw_bar(axes, place + shift, terms[:top], limit)
+                _draw_bar(axes, place + shift, terms[:top], names, limit)
         _finish(axes, groups, top, limit)
-        _legend(figure, groups, top)
+        _legend(figure, groups, names, top)
     return figure
 
 
@@ -109,7 +123,14 @@ def _means(terms: FloatArray) -> FloatArray:
     return reachable.mean(axis=0) if len(reachable) else np.zeros(terms.shape[1])
 
 
-def _draw_bar(axes: Axes, x: float, terms: FloatArray, limit: float) -> None:
+def term_label(name: str) -> str:
+    """A term in words."""
+    return name.replace("_", " ")
+
+
+def _draw_bar(
+    axes: Axes, x: float, terms: FloatArray, names: Sequence[str], limit: float
+) -> None:
     unreachable = int(np.isnan(terms).any(axis=1).sum())
     if unreachable:
         axes.bar(x, limit, BAR_WIDTH, color=NOT_ATTEMPTED, zorder=1)
@@ -118,7 +139,8 @@ def _draw_bar(axes: Axes, x: float, terms: FloatArray, limit: float) -> None:
             x, limit * 0.985, text, ha="center", va="top", fontsize=6.6, color=INK
         )
     bottom = 0.0
-    for value, colour in zip(_means(terms), TERM_COLOURS, strict=False):
+    for value, name in zip(_means(terms), names, strict=True):
+        colour = TERM_COLOURS[name]
         axes.bar(x, value, BAR_WIDTH, bottom=bottom, color=colour, zorder=2)
         bottom += float(value)
     if unreachable < len(terms):
@@ -151,11 +173,11 @@ def _finish(axes: Axes, groups: Sequence[CostGroup], top: int, limit: float) -> 
     axes.set_axisbelow(True)
 
 
-def _legend(figure: Figure, groups: Sequence[CostGroup], top: int) -> None:
-    count = groups[0].supplied.shape[1]
+def _legend(
+    figure: Figure, groups: Sequence[CostGroup], names: Sequence[str], top: int
+) -> None:
     left = 0.75 / float(figure.get_size_inches()[0])
-    named = zip(TERM_COLOURS[:count], TERM_LABELS[:count], strict=True)
-    handles = [Patch(color=colour, label=label) for colour, label in named]
+    handles = [Patch(color=TERM_COLOURS[k], label=term_label(k)) for k in names]
     orders = [terms[:top] for g in groups for terms in (g.supplied, g.ranked)]
     if any(np.isnan(terms).any() for terms in orders):
         handles.append(

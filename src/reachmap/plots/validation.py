@@ -21,7 +21,8 @@ from reachmap.plots.parts.style import (
     new_figure,
     put_title,
 )
-from reachmap.plots.ranking import TERM_COLOURS, TERM_LABELS
+from reachmap.plots.ranking import TERM_COLOURS, term_label
+from reachmap.ranking.lookup.table import TERMS
 from reachmap.text import printable
 from reachmap.validation.judgement import ORDERS, JudgedList
 from reachmap.validation.statistics import Share
@@ -157,10 +158,7 @@ def _draw_groups(axes: Axes, groups: Sequence[GroupSummary], top: int) -> None:
     axes.spines[["top", "right"]].set_visible(False)
     axes.yaxis.grid(visible=True, color=RULE, linewidth=0.4, alpha=0.5)
     axes.set_axisbelow(True)
-    handles = [
-        Patch(color=colour, label=label)
-        for colour, label in zip(TERM_COLOURS[:3], TERM_LABELS[:3], strict=True)
-    ]
+    handles = [Patch(color=TERM_COLOURS[k], label=term_label(k)) for k in TERMS]
     axes.legend(
         handles=[*handles, Patch(color=NOT_ATTEMPTED, label="some not reached")],
         loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=4, fontsize=7.0,
@@ -177,7 +175,8 @@ def _draw_bar(axes: Axes, x: float, figures: OrderFigures, limit: float) -> None
             va="top", fontsize=5.4, color=INK, rotation=90,
         )  # fmt: skip
     bottom = 0.0
-    for value, colour in zip(np.nan_to_num(figures.terms), TERM_COLOURS, strict=False):
+    for value, name in zip(np.nan_to_num(figures.terms), TERMS, strict=True):
+        colour = TERM_COLOURS[name]
         axes.bar(x, value, BAR_WIDTH, bottom=bottom, color=colour, zorder=2)
         bottom += float(value)
     if figures.reached:

@@ -28,7 +28,7 @@ from reachmap.plots.parts.levels import level_names
 from reachmap.plots.parts.stack import stack_of
 from reachmap.plots.placement import draw_placement
 from reachmap.plots.saturation import draw_saturation
-from reachmap.ranking.lookup.costs import grasp_costs
+from reachmap.ranking.lookup.columns import columns_of
 from reachmap.ranking.lookup.settings import RankSettings
 from reachmap.ranking.lookup.table import table_from_bin_map
 from reachmap.report.blocks import (
@@ -181,9 +181,8 @@ def _excluded(summary: PlacementSummary) -> Blocks:
 def bin_section(record: BinMap) -> Section:
     """Reachability, attempts, costs and approach directions inside the bin."""
     summary = summarise_bin(record)
-    weights = RankSettings().weights
     grasps = table_from_bin_map(record)
-    cost = grasp_costs(grasps, weights).reshape(grasps.shape)
+    cost = columns_of(grasps, RankSettings()).costs().reshape(grasps.shape)
     pictures = []
     for layer, name in enumerate(level_names(record.layer)):
         where = f" in the layer {name} m above the bottom" if summary.layers > 1 else ""

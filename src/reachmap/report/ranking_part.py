@@ -9,8 +9,9 @@ import numpy as np
 
 from reachmap._typing import FloatArray
 from reachmap.maps.format.registry import Artefact
-from reachmap.plots.ranking import MAX_GROUPS, TERM_LABELS, CostGroup, ranking_chart
+from reachmap.plots.ranking import MAX_GROUPS, CostGroup, ranking_chart, term_label
 from reachmap.ranking.answers.ranked_list import QUADRANT_ORDER, TERM_NAMES
+from reachmap.ranking.lookup.table import TERMS
 from reachmap.report.blocks import (
     Blocks,
     Heading,
@@ -41,16 +42,17 @@ def ranking_section(
     """
     parts: list[Blocks] = []
     groups: list[CostGroup] = []
+    names = _terms_of(documents)
     for index, document in enumerate(documents):
         name = f"List {index + 1}" if len(documents) > 1 else ""
         if name:
             parts.append(Heading(name))
         parts += [paragraph(_words(document)), _table(document)]
-        groups += _groups(document, name)
+        groups += _groups(document, name, names)
     if groups:
         parts.append(
             drawn(
-                ranking_chart(groups[:MAX_GROUPS], TOP),
+                ranking_chart(groups[:MAX_GROUPS], names, TOP),
                 "Mean cost of the first grasps, as supplied and re-ranked; the map is "
                 "all that was asked.",
                 record,
@@ -79,16 +81,24 @@ def _table(document: Mapping[str, Any]) -> Table:
             row.name,
             row.quadrant,
             number(row.cost, 3),
-            *(number(row.terms.get(name), 3) for name in TERM_NAMES[:3]),
+            *(number(row.terms.get(name), 3) for name in TERMS),
             row.status,
         )
         for row in ranked_rows(document)[:TOP]
     ]
-    head = ("rank", "was", "grasp", "quadrant", "J", *TERM_LABELS[:3], "state")
+    head = ("rank", "was", "grasp", "quadrant", "J", *map(term_label, TERMS), "state")
     return table(head, rows, ">><<>>>><")
 
 
-def _groups(document: Mapping[str, Any], name: str) -> list[CostGroup]:
+def _terms_of(documents: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Terms of the cost that any of the lists was ranked by."""
+    known = {name for d in documents for row in ranked_rows(d) for name in row.terms}
+    return [name for name in TERM_NAMES if name in known or name in TERMS]
+
+
+def _groups(
+    document: Mapping[str, Any], name: str, names: Sequence[str]
+) -> list[CostGroup]:
     """Costs by quadrant, or of the whole list if it names none."""
     rows = ranked_rows(document)
     several = any(row.quadrant for row in rows)
@@ -100,13 +110,20 @@ def _groups(document: Mapping[str, Any], name: str) -> list[CostGroup]:
         if own:
             label = f"{name} {quadrant or rest}".strip()
             groups.append(
-                CostGroup(label=label, supplied=_terms(supplied), ranked=_terms(own))
+                CostGroup(
+                    label=label,
+                    supplied=_terms(supplied, names),
+                    ranked=_terms(own, names),
+                )
             )
     return groups
 
 
-def _terms(rows: Sequence[RankedRow]) -> FloatArray:
-    """Terms of J, shape (n, 3) or (n, 4) with likeness; NaN where unreachable."""
-    with_likeness = any(TERM_NAMES[3] in row.terms for row in rows)
-    names = TERM_NAMES if with_likeness else TERM_NAMES[:3]
-    return np.array([[row.terms.get(name, np.nan) for name in names] for row in rows])
+def _terms(rows: Sequence[RankedRow], names: Sequence[str]) -> FloatArray:
+    """Terms of the cost, shape (n, k); NaN where unreachable, 0 where left out."""
+    return np.array(
+        [
+            [row.terms.get(name, 0.0 if row.terms else np.nan) for name in names]
+            for row in rows
+        ]
+    )

@@ -26,7 +26,7 @@ from reachmap.plots.albums import (
 from reachmap.plots.parts.files import Picture, Table, write_all
 from reachmap.plots.parts.levels import QUANTITIES, Quantity
 from reachmap.plots.parts.style import Format, PercentMap
-from reachmap.ranking.lookup.costs import grasp_costs
+from reachmap.ranking.lookup.columns import columns_of
 from reachmap.ranking.lookup.settings import RankSettings
 from reachmap.ranking.lookup.table import table_from_bin_map
 
@@ -114,7 +114,7 @@ def _bin_items(
     bin_map: BinMap, percent_map: PercentMap, tables: bool
 ) -> list[Picture | Table]:
     table = table_from_bin_map(bin_map)
-    cost = grasp_costs(table, RankSettings().weights).reshape(table.shape)
+    cost = columns_of(table, RankSettings()).costs().reshape(table.shape)
     return bin_album(bin_map, cost, percent_map=percent_map, tables=tables)
 
 

@@ -266,7 +266,9 @@ def _draw(
         CostGroup(label=label, supplied=supplied, ranked=best_first)
         for label, (supplied, best_first) in cost_groups(ranked).items()
     ]
-    figure = ranking_chart(groups, top, subtitle=_subtitle(ranked))
+    figure = ranking_chart(
+        groups, tuple(ranked[0].terms()), top, subtitle=_subtitle(ranked)
+    )
     data = figure_bytes(
         figure,
         "svg" if chart.suffix == ".svg" else "png",
@@ -278,5 +280,5 @@ def _draw(
 
 def _subtitle(ranked: Sequence[RankedList]) -> str:
     names = ", ".join(Path(one.grasps.source).name for one in ranked)
-    alpha, beta, delta = ranked[0].settings["weights"]
+    alpha, beta, delta = ranked[0].asked.weights
     return f"{names} · J with α = {alpha:g}, β = {beta:g}, δ = {delta:g}"

@@ -99,7 +99,7 @@ def judge_list(
 ) -> JudgedList:
     """Put what planning found beside what the map predicted."""
     ranking = ranked.ranking
-    weights = np.asarray(ranked.settings["weights"], float)
+    weights = np.asarray(ranked.asked.weights, float)
     scale = weights / ranker.table.scale
     costs = _costs(bin_map, ranker, results)
     attempts = costs @ scale

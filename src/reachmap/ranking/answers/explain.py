@@ -159,10 +159,10 @@ def _cost_line(ranked: RankedList, row: int) -> str:
     ranking = ranked.ranking
     if not ranking.reachable[row]:
         return f"none: {status_name(ranking.status[row])}"
-    names = ("path length", "planning time", "execution time", "likeness")
-    count = 4 if ranked.with_likeness else 3
-    terms = zip(names[:count], ranking.terms[row, :count], strict=True)
-    parts = " + ".join(f"{value:.3f} {name}" for name, value in terms)
+    parts = " + ".join(
+        f"{values[row]:.3f} {name.replace('_', ' ')}"
+        for name, values in ranked.terms().items()
+    )
     tool = _vector(ranking.orientation_wxyz[row], 4)
     return f"J = {ranking.cost[row]:.3f} = {parts}; tool orientation wxyz {tool}"
 
@@ -175,7 +175,7 @@ def _tie_lines(
     point, orientation = ranker.tied(query)
     if len(point) < 2:
         return []
-    costs = ranker.test_costs(ranked.settings["weights"])
+    costs = ranker.test_costs(ranked.asked)
     lines = []
     for p, o in zip(point.tolist(), orientation.tolist(), strict=True):
         at = (*(int(i) for i in np.unravel_index(p, ranker.table.shape[:3])), o)

@@ -64,8 +64,8 @@ def rank_list(
         grasps=grasps,
         queries=queries,
         ranking=ranking,
-        settings=_header(ranker, settings),
-        with_likeness=settings.likeness > 0,
+        asked=settings,
+        header=_header(ranker, settings),
         doubts=list_doubts(
             grasps,
             ranking,
@@ -85,6 +85,7 @@ def _header(ranker: Ranker, settings: RankSettings) -> Mapping[str, Any]:
         "cell_sha256": ranker.stamp.cell_sha256,
         "weights": list(settings.weights),
         "likeness": settings.likeness,
+        **({"margins": dict(settings.margins)} if settings.margins else {}),
         "neighbours": settings.neighbours,
         "roll": settings.roll,
         "max_angle_deg": settings.max_angle_deg,

@@ -12,11 +12,13 @@ import numpy as np
 
 from reachmap._typing import FloatArray
 from reachmap.ranking.lists.arrays import GraspList
+from reachmap.ranking.lookup.columns import LIKENESS
 from reachmap.ranking.lookup.matching import Queries
 from reachmap.ranking.lookup.order import INVALID, OUTSIDE_MAP, Ranking, status_name
+from reachmap.ranking.lookup.settings import MARGINS, RankSettings
 from reachmap.ranking.lookup.table import TERMS
 
-TERM_NAMES = (*TERMS, "likeness")
+TERM_NAMES = (*TERMS, LIKENESS, *MARGINS)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -30,10 +32,10 @@ class RankedList:
         The grasps in robot_base, as they were matched.
     ranking : Ranking
         Rows in supplied order.
-    settings : mapping
-        What it was ranked with; written to the document.
-    with_likeness : bool
-        Whether the likeness term takes part in the cost.
+    asked : RankSettings
+        What it was ranked with.
+    header : mapping
+        The same and the map's identity, as written to the document.
     doubts : tuple of str
         Questions that the list as a whole raises.
     """
@@ -41,9 +43,18 @@ class RankedList:
     grasps: GraspList
     queries: Queries
     ranking: Ranking
-    settings: Mapping[str, Any]
-    with_likeness: bool = False
+    asked: RankSettings
+    header: Mapping[str, Any]
     doubts: tuple[str, ...] = ()
+
+    def terms(self) -> dict[str, FloatArray]:
+        """Summands of the cost that were asked for, by name, each of shape (n,)."""
+        named = zip(self.ranking.term_names, self.ranking.terms.T, strict=True)
+        return {
+            name: values
+            for name, values in named
+            if name != LIKENESS or self.asked.likeness
+        }
 
     def counts(self) -> dict[str, int]:
         """How many grasps ended in which status, most frequent first."""
@@ -82,7 +93,7 @@ def ranked_document(ranked: RankedList, top: int | None = None) -> dict[str, Any
     order = ranked.ranking.order[:top].tolist()
     results = _results(ranked)
     document["reachmap"] = {
-        **ranked.settings,
+        **ranked.header,
         "counts": ranked.counts(),
         "doubts": list(ranked.doubts),
     }
@@ -109,12 +120,13 @@ def _results(ranked: RankedList) -> list[dict[str, Any]]:
     ranking, quadrants = ranked.ranking, ranked.grasps.quadrants
     after = quadrant_ranks(ranking.order.tolist(), quadrants)
     before = quadrant_ranks(range(len(quadrants)), quadrants)
+    named = ranked.terms()
     columns = zip(
         ranking.rank.tolist(),
         after,
         before,
         ranking.cost.tolist(),
-        ranking.terms.tolist(),
+        np.stack([*named.values()], axis=1).tolist(),
         ranking.status.tolist(),
         ranking.test_grasp.tolist(),
         ranking.distance.tolist(),
@@ -123,16 +135,18 @@ def _results(ranked: RankedList) -> list[dict[str, Any]]:
         ranking.extrapolated.tolist(),
         strict=True,
     )
-    count = 4 if ranked.with_likeness else 3
-    return [_result(row, count, values) for row, values in enumerate(columns, start=1)]
+    names = tuple(named)
+    return [_result(row, names, values) for row, values in enumerate(columns, start=1)]
 
 
-def _result(supplied: int, count: int, values: tuple[Any, ...]) -> dict[str, Any]:
+def _result(
+    supplied: int, names: tuple[str, ...], values: tuple[Any, ...]
+) -> dict[str, Any]:
     rank, after, before, cost, terms, code, test_grasp, phi1, phi2, wxyz, far = values
     reachable = bool(np.isfinite(cost))
     inside = code not in (OUTSIDE_MAP, INVALID)
     quadrant = {"quadrant_rank": after, "original_quadrant_rank": before}
-    named = dict(zip(TERM_NAMES[:count], terms[:count], strict=True))
+    named = dict(zip(names, terms, strict=True))
     return {
         "rank": rank,
         "original_rank": supplied,
@@ -164,12 +178,12 @@ def cost_groups(
     Returns
     -------
     dict
-        From label to the terms in supplied order and in ranked order, shape (n, 3),
-        or (n, 4) with likeness; a row of NaN is an unreachable grasp.
+        From label to the terms in supplied order and in ranked order, shape (n, k);
+        a row of NaN is an unreachable grasp.
     """
     groups = {}
     for one in ranked:
-        terms = one.ranking.terms[:, : 4 if one.with_likeness else 3]
+        terms = np.stack([*one.terms().values()], axis=1)
         for label, rows in _rows(one, several=len(ranked) > 1).items():
             order = one.ranking.order
             best_first = order[np.isin(order, rows)]

@@ -1,4 +1,4 @@
-"""The cost J: terms of the test grasp, blending, likeness, and where it is undefined.
+"""The cost J: blending of terms, likeness, and where it is undefined.
 
 J = α φ3 + β φ4 + δ φ5 + ε φ6, with φ3, φ4, φ5 the mean path length, planning time and
 execution time of the test grasp, each divided by a high quantile (or the maximum) over
@@ -12,6 +12,7 @@ from typing import Final
 import numpy as np
 
 from reachmap._typing import BoolArray, FloatArray, IntArray
+from reachmap.ranking.lookup.columns import Columns
 from reachmap.ranking.lookup.matching import (
     TIED_POINTS,
     Matches,
@@ -29,17 +30,6 @@ SIDEWAYS_TOLERANCE_M: Final = 1e-3
 VERTICAL_TOLERANCE_M: Final = 0.05
 BOTTOM_TOLERANCE_M: Final = 5e-3
 MIN_DISTANCE_M: Final = 1e-6
-
-
-def grasp_costs(table: GraspTable, weights: tuple[float, float, float]) -> FloatArray:
-    """J without likeness of every test grasp, inf where unreachable.
-
-    Returns
-    -------
-    array, shape (points, orientations)
-    """
-    cost = table.normalised @ np.asarray(weights, float)
-    return np.where(table.reachable, cost, np.inf)
 
 
 def outside_map(points: FloatArray, nearest: IntArray, table: GraspTable) -> BoolArray:
@@ -108,10 +98,10 @@ def blended_terms(
     matches: Matches,
     table: GraspTable,
     tree: NearestPoints,
-    table_cost: FloatArray,
+    columns: Columns,
     neighbours: int,
 ) -> FloatArray:
-    """φ3, φ4, φ5 blended over the k nearest test points by inverse distance.
+    """Terms of test grasps blended over the k nearest test points by inverse distance.
 
     Whether a grasp is reachable is still decided by its nearest test grasp alone. An
     unreachable neighbour counts with the greatest cost there is in each term: were it
@@ -119,30 +109,30 @@ def blended_terms(
 
     Parameters
     ----------
-    phi : array, shape (n, 3)
+    phi : array, shape (n, k)
         Terms of the nearest test grasps; NaN where unreachable.
     queries, matches, table, tree
         The grasps, their nearest test grasps, and where to look.
-    table_cost : array, shape (points, orientations)
+    columns : Columns
     neighbours : int
 
     Returns
     -------
-    array, shape (n, 3)
+    array, shape (n, k)
         NaN where the nearest test grasp is unreachable.
     """
     distance, point = _in_order(queries.points, tree, neighbours + 1)
     weight = 1.0 / np.maximum(matches.distance, MIN_DISTANCE_M)
     total, blend = weight.copy(), phi * weight[:, None]
-    worth = worth_of(table_cost)
+    worth = worth_of(columns.costs())
     # The matched point is one of the nearest; the others follow by distance.
     used = np.zeros(len(queries), np.int64)
     for column in range(point.shape[1]):
         other = (point[:, column] != matches.point) & (used < neighbours - 1)
         used += other
         near = match_at(queries, table, point[:, column], distance[:, column], worth)
-        terms = table.normalised[near.point, near.orientation]
-        terms = np.where(np.isnan(terms), table.maxima / table.scale, terms)
+        terms = columns.values[near.point, near.orientation]
+        terms = np.where(np.isnan(terms), columns.worst, terms)
         weight = np.where(other, 1.0 / np.maximum(near.distance, MIN_DISTANCE_M), 0.0)
         total += weight
         blend += terms * weight[:, None]

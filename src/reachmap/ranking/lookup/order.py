@@ -33,8 +33,10 @@ class Ranking:
         supplied order.
     cost : array, shape (n,)
         J; inf where unreachable.
-    terms : array, shape (n, 4)
-        α φ3, β φ4, δ φ5, ε φ6, which add up to J; NaN where unreachable.
+    terms : array, shape (n, k)
+        α φ3, β φ4, δ φ5, ε φ6 and the margins that were asked for, each with its
+        weight, which add up to J; NaN where unreachable.
+    term_names : tuple of str, length k
     status : uint8 array, shape (n,)
         :class:`reachmap.maps.records.Status` of the test grasp, or ``OUTSIDE_MAP``
         (too far from the test points), ``UNLIKE_MAP`` (no orientation is near enough)
@@ -56,6 +58,7 @@ class Ranking:
     order: IntArray
     cost: FloatArray
     terms: FloatArray
+    term_names: tuple[str, ...]
     status: CodeArray
     test_grasp: IntArray
     distance: FloatArray

@@ -13,10 +13,10 @@ from reachmap._typing import FloatArray, IntArray
 from reachmap.errors import SettingsError
 from reachmap.maps.format.bin import read_bin_map
 from reachmap.maps.records import BinMap, Stamp
+from reachmap.ranking.lookup.columns import LIKENESS, Columns, columns_of
 from reachmap.ranking.lookup.costs import (
     beyond_points,
     blended_terms,
-    grasp_costs,
     likeness_terms,
     outside_map,
     unlike_map,
@@ -98,6 +98,7 @@ class Ranker:
         quaternions_xyzw: ArrayLike | None = None,
         weights: Sequence[float] = (1.0, 1.0, 1.0),
         likeness: float = 0.0,
+        margins: Mapping[str, float] | None = None,
         neighbours: int = 1,
         roll: Roll = "as-given",
         max_angle_deg: float | None = None,
@@ -120,6 +121,9 @@ class Ranker:
             α, β, δ of path length, planning time and execution time.
         likeness : float
             ε of the likeness term φ6.
+        margins : mapping, optional
+            Weights of ``clearance``, ``joint_margin``, ``singularity`` and
+            ``wind_up``; those left out weigh 0.
         neighbours : int
             Test points whose costs are blended.
         roll : {"as-given", "free", "fixed"}
@@ -135,11 +139,13 @@ class Ranker:
         ------
         SettingsError
             Arrays that do not fit together; weights out of range; with
-            ``invalid="raise"`` also the rows that are no grasps.
+            ``invalid="raise"`` also the rows that are no grasps; margins of a map that
+            has none.
         """
         settings = RankSettings(
             weights=tuple(weights),  # type: ignore[arg-type]
             likeness=likeness,
+            margins=dict(margins or {}),
             neighbours=neighbours,
             roll=roll,
             max_angle_deg=max_angle_deg,
@@ -166,11 +172,11 @@ class Ranker:
     ) -> Ranking:
         """Rank grasps that are checked already."""
         table = self.table
-        table_cost = grasp_costs(table, settings.weights)
-        matches = match(queries, table, self._tree, table_cost)
+        columns = columns_of(table, settings)
+        matches = match(queries, table, self._tree, columns.costs())
         outside = outside_map(queries.points, matches.point, table)
         unlike = unlike_map(matches, queries.free, table, settings.max_angle_deg)
-        terms = self._terms(queries, matches, table_cost, settings)
+        names, terms = self._terms(queries, matches, columns, settings)
         matched = queries.valid & ~outside & ~unlike
         cost = np.where(matched, terms.sum(axis=1), np.inf)
         cost[np.isnan(cost)] = np.inf
@@ -184,6 +190,7 @@ class Ranker:
             order=stable_order(cost, scores),
             cost=cost,
             terms=np.where(reachable[:, None], terms, np.nan),
+            term_names=names,
             status=status,
             test_grasp=np.where(valid[:, None], _unravelled(matches, table), -1),
             distance=np.where(valid, matches.distance, np.nan),
@@ -198,20 +205,23 @@ class Ranker:
         """Points and orientations of the test grasps that tie for one grasp."""
         return tied(query, self.table, self._tree)
 
-    def test_costs(self, weights: tuple[float, float, float]) -> FloatArray:
-        """J of every test grasp, shape (points, orientations); inf if unreachable."""
-        return grasp_costs(self.table, weights)
+    def test_costs(self, settings: RankSettings) -> FloatArray:
+        """Cost of every test grasp, shape (points, orientations); inf: unreachable.
+
+        Without what depends on the grasp that is ranked.
+        """
+        return columns_of(self.table, settings).costs()
 
     def _terms(
         self,
         queries: Queries,
         matches: Matches,
-        table_cost: FloatArray,
+        columns: Columns,
         settings: RankSettings,
-    ) -> FloatArray:
-        """Summands of J, shape (n, 4); NaN where the test grasp is unreachable."""
+    ) -> tuple[tuple[str, ...], FloatArray]:
+        """Summands of J with names, (n, k); NaN where the test grasp is unreachable."""
         table = self.table
-        phi = table.normalised[matches.point, matches.orientation]
+        phi = columns.values[matches.point, matches.orientation]
         if settings.neighbours > 1:
             phi = blended_terms(
                 phi,
@@ -219,13 +229,12 @@ class Ranker:
                 matches,
                 table,
                 self._tree,
-                table_cost,
+                columns,
                 settings.neighbours,
             )
-        terms = np.empty((len(queries), 4))
-        terms[:, :3] = phi * settings.weights
-        terms[:, 3] = settings.likeness * likeness_terms(matches, queries.free, table)
-        return terms
+        unlike = settings.likeness * likeness_terms(matches, queries.free, table)
+        terms = np.insert(phi * columns.weights, 3, unlike, axis=1)
+        return (*columns.names[:3], LIKENESS, *columns.names[3:]), terms
 
 
 def _unravelled(matches: Matches, table: GraspTable) -> IntArray:

@@ -1,9 +1,10 @@
-"""What a ranking can be asked for: weights, likeness, neighbours, roll."""
+"""What a ranking can be asked for: weights, likeness, margins, neighbours, roll."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Final, Literal, TypeAlias
 
 from reachmap.errors import SettingsError
@@ -23,6 +24,8 @@ Roll: TypeAlias = Literal["as-given", "free", "fixed"]
 ROLLS: Final[tuple[Roll, ...]] = ("as-given", "free", "fixed")
 MAX_WEIGHT: Final = 1e6
 MAX_NEIGHBOURS: Final = 64
+MARGINS: Final = ("clearance", "joint_margin", "singularity", "wind_up")
+"""Optional terms of J: what a path leaves, and how far it winds the wrist up."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -58,7 +61,7 @@ class CostBasis:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RankSettings:
-    """J = α φ3 + β φ4 + δ φ5 + ε φ6, and how test grasps are matched.
+    """J = α φ3 + β φ4 + δ φ5 + ε φ6 + Σ μ_k φ_k, and how test grasps are matched.
 
     Attributes
     ----------
@@ -66,6 +69,8 @@ class RankSettings:
         α, β, δ of path length, planning time and execution time.
     likeness : float
         ε of the distance to the test grasp; 0 is the paper's J.
+    margins : mapping
+        Weights μ of the terms in ``MARGINS``, by name; those left out weigh 0.
     neighbours : int
         Test points whose costs are blended; 1 is the paper's nearest.
     roll : {"as-given", "free", "fixed"}
@@ -80,6 +85,7 @@ class RankSettings:
 
     weights: tuple[float, float, float] = (1.0, 1.0, 1.0)
     likeness: float = 0.0
+    margins: Mapping[str, float] = field(default_factory=dict)
     neighbours: int = 1
     roll: Roll = "as-given"
     max_angle_deg: float | None = None
@@ -91,6 +97,9 @@ class RankSettings:
         named = zip(("alpha", "beta", "delta"), self.weights, strict=True)
         problems = [_weight_problem(name, value) for name, value in named]
         problems.append(_weight_problem("likeness", self.likeness))
+        problems += [_weight_problem(*item) for item in self.margins.items()]
+        if unknown := sorted(set(self.margins) - set(MARGINS)):
+            problems.append(f"margins are {', '.join(MARGINS)} (got {unknown})")
         if not 1 <= self.neighbours <= MAX_NEIGHBOURS:
             problems.append(
                 f"neighbours must be 1 to {MAX_NEIGHBOURS} (got {self.neighbours})"
@@ -102,7 +111,7 @@ class RankSettings:
         limit = self.max_angle_deg
         if limit is not None and not 0 < limit <= 180:
             problems.append(f"max_angle_deg must be above 0, to 180 (got {limit:g})")
-        if not any(self.weights) and not self.likeness:
+        if not any((*self.weights, self.likeness, *self.margins.values())):
             problems.append("one weight at least must be above 0")
         mistakes = [problem for problem in problems if problem]
         if mistakes:

@@ -18,6 +18,7 @@ from reachmap.geometry import (
 from reachmap.maps.bytes.hashing import canonical_array
 from reachmap.maps.records import BinMap, Status, freeze
 from reachmap.ranking.lookup.approach import axis_vector
+from reachmap.ranking.lookup.margins import margin_terms, margin_values
 from reachmap.ranking.lookup.settings import QUANTILE, CostBasis
 
 TERMS: Final = ("path_length", "planning_time", "execution_time")
@@ -57,6 +58,8 @@ class GraspTable:
         What each mean is divided by; 1 where the mean is zero everywhere.
     normalised : array, shape (n, m, 3)
         φ3, φ4, φ5: means over scale; NaN where unreachable.
+    margins : array, shape (n, m, 4), or None
+        Terms in the order of ``MARGINS``, normalised; None for a map without them.
     basis : CostBasis
         With the planning time that was used, whatever was asked for.
     same_everywhere : bool
@@ -86,6 +89,7 @@ class GraspTable:
     maxima: FloatArray
     scale: FloatArray
     normalised: FloatArray
+    margins: FloatArray | None
     basis: CostBasis
     same_everywhere: bool
     layers: FloatArray
@@ -108,6 +112,7 @@ class GraspTable:
             self.status,
             self.reachable,
             self.normalised,
+            np.zeros(0) if self.margins is None else self.margins,
         ):
             digest.update(canonical_array(values).tobytes())
         return digest.hexdigest()
@@ -155,6 +160,7 @@ def table_from_bin_map(bin_map: BinMap, basis: CostBasis | None = None) -> Grasp
         maxima=maxima,
         scale=scale,
         normalised=means / scale,
+        margins=_margins(bin_map, reachable, basis),
         basis=basis,
         same_everywhere=bool(
             (quaternion_angle(quaternions, quaternions[0]) < 1e-9).all()
@@ -239,8 +245,21 @@ def _of_best_paths(bin_map: BinMap) -> FloatArray:
     return np.where(best.row[..., None] >= 0, values, np.nan)
 
 
+def _margins(
+    bin_map: BinMap, reachable: BoolArray, basis: CostBasis
+) -> FloatArray | None:
+    values = margin_values(bin_map)
+    if values is None:
+        return None
+    return margin_terms(
+        values.reshape(*reachable.shape, -1),
+        reachable,
+        lambda known, maxima: _scale(known, maxima, basis),
+    )
+
+
 def _scale(means: FloatArray, maxima: FloatArray, basis: CostBasis) -> FloatArray:
-    """What the means (reachable, 3) are divided by, shape (3,)."""
+    """What values (reachable, k) are divided by, shape (k,)."""
     scale: FloatArray = maxima
     if basis.normalise == "quantile" and len(means):
         quantile = np.quantile(means, QUANTILE, axis=0)
