@@ -35,12 +35,19 @@ log = logging.getLogger(__name__)
     help="Paths that branch off a shared network of routes, or the cell's planner from "
     "scratch each time, as in the paper; default: the cell's bin_scan.attempts.",
 )
+@click.option(
+    "--part",
+    metavar="NAME",
+    help="Which of the cell's parts is picked; default: the cell's part, or the first "
+    "of its parts.",
+)
 @scan_options
 def command(
     placement: Path | None,
     cell: str | None,
     output: Path,
     attempts: str | None,
+    part: str | None,
     overrides: tuple[str, ...],
     seed: int | None,
     workers: int,
@@ -69,6 +76,8 @@ def command(
 
     if attempts is not None:
         overrides = (*overrides, f"bin_scan.attempts={attempts}")
+    if part is not None:
+        overrides = (*overrides, f"part={part}")
     check_scan_options(shard, executor, dry_run=dry_run)
     if placement is not None:
         unused("cell", because="PLACEMENT holds the cell; leave one of them out")

@@ -18,7 +18,7 @@ from reachmap.cell.files.files import body_key
 from reachmap.cell.files.joint_limits import MoveItLimits
 from reachmap.cell.files.resources import NotFoundError, Resolver
 from reachmap.cell.files.urdf import UrdfDescription, parse_urdf
-from reachmap.cell.model.cell import Cell, ScanConfiguration
+from reachmap.cell.model.cell import Cell, JointValues, ScanConfiguration
 from reachmap.errors import CellError
 
 
@@ -86,7 +86,10 @@ class LoadedCell:
     @property
     def scan_configuration_rad(self) -> dict[str, float]:
         """Joint name to position in the scan configuration [rad or m]."""
-        given = self.cell.scan_configuration
+        return self.joint_values_rad(self.cell.scan_configuration)
+
+    def joint_values_rad(self, given: JointValues) -> dict[str, float]:
+        """Joint name to position where a cell gives joint values [rad or m]."""
         if given.q_rad is not None:
             return dict(given.q_rad)
         joints = self.robot.joints
@@ -176,17 +179,32 @@ def fingerprint(
     # The numbers that parameters lead to stand in their places.
     del data["parameters"], data["expressions"]
     del data["bin"]["carrier"]
+    _reduce_cycle(cell, data)
     robot = data["robot"]
     del robot["xacro_args"], robot["joint_limits"], robot["group"]
     hashes = {name: f"sha256:{digest}" for name, digest in files_sha256.items()}
     robot["urdf"] = sha256_text(_with_filenames(urdf, hashes, bare_names=True))
     robot["srdf"] = sha256_text(srdf) if srdf else None
     meshes = [(body["name"], body["shape"]["mesh"]) for body in data["bodies"]]
+    if (held := cell.held()) is not None:
+        meshes.append((held[0], data["part"]["shape"]["mesh"]))
     for name, mesh in [*meshes, ("bin", data["bin"]["mesh"])]:
         if mesh is not None:
             mesh["file"] = files_sha256[body_key(name, mesh["file"])]
     text = json.dumps(data, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
     return sha256_text(text)
+
+
+def _reduce_cycle(cell: Cell, data: dict[str, Any]) -> None:
+    """Keep of the pick cycle what has an effect: nothing of it without a part."""
+    del data["parts"]
+    held = cell.held()
+    if held is None:
+        for key in ("part", "lift", "drop_off", "cycle"):
+            del data[key]
+        return
+    data["part"] = json.loads(held[1].model_dump_json())
+    data["drop_off"] = [json.loads(p.model_dump_json()) for p in cell.drop_offs]
 
 
 def sha256_text(text: str) -> str:

@@ -14,6 +14,7 @@ from reachmap.cell.filling import write_out_fill
 from reachmap.cell.loaded import LoadedCell, fingerprint
 from reachmap.cell.model.cell import Cell
 from reachmap.cell.mounting import check_bin_stands, leaning_levels
+from reachmap.cell.pick_cycle import check_part_choice
 from reachmap.cell.references import check_names, find_doubts
 from reachmap.cell.resolution import resolved_cell, validated
 from reachmap.cell.support import stood_on_support
@@ -104,6 +105,7 @@ def cell_from_text(
     resolve_expressions(document)
     write_out_carrier(document)
     write_out_fill(document)
+    check_part_choice(document)
     cell = validated(document)
     files = read_files(document, directory)
     if files.robot is not None:
@@ -247,6 +249,7 @@ def stored_cell(
     resolve_expressions(document)
     write_out_carrier(document)
     write_out_fill(document)
+    check_part_choice(document)
     cell = validated(document)
     document.raise_mistakes()
     if cell is None:

@@ -17,6 +17,7 @@ from reachmap.cell.files.urdf import UrdfDescription
 from reachmap.cell.model.cell import Cell
 from reachmap.cell.model.fields import MAX_LENGTH_M
 from reachmap.cell.model.shapes import sides
+from reachmap.cell.pick_cycle import check_cycle_names, joint_value_places
 from reachmap.cell.text.data import at, entries, text_at
 from reachmap.cell.text.messages import did_you_mean
 from reachmap.cell.text.yaml_reader import Document, Location
@@ -31,6 +32,7 @@ def check_names(
     _check_frames(document, robot)
     _check_body_names(document, robot)
     _check_touch(document, robot)
+    check_cycle_names(document, robot)
     _check_srdf_names(document, srdf)
     moving: tuple[str, ...] | None = moving_joints(document.data, robot, srdf)
     unsure = any(m.location[:1] == ("robot",) for m in document.mistakes)
@@ -43,7 +45,8 @@ def check_names(
     given = entries(document.data, "robot", "joints")
     # Otherwise what follows from a wrong chain would bury the cause.
     if moving is not None and len(moving) >= len(given):
-        _check_scan_configuration(document, moving)
+        for place in joint_value_places(document.data):
+            _check_joint_values(document, place, moving)
 
 
 def moving_joints(
@@ -160,10 +163,10 @@ def _check_joints(
 
 
 def _check_srdf_names(document: Document, srdf: SrdfDescription | None) -> None:
-    for location, kind in (
-        (("robot", "group"), "group"),
-        (("scan_configuration", "group_state"), "group_state"),
-    ):
+    places: list[tuple[Location, str]] = [(("robot", "group"), "group")]
+    for place in joint_value_places(document.data):
+        places.append(((*place, "group_state"), "group_state"))
+    for location, kind in places:
         name = text_at(document.data, *location)
         if name is None:
             continue
@@ -176,12 +179,14 @@ def _check_srdf_names(document: Document, srdf: SrdfDescription | None) -> None:
                 document.add(location, f"no {kind} {name!r} in the SRDF; {hint}")
 
 
-def _check_scan_configuration(document: Document, moving: tuple[str, ...]) -> None:
+def _check_joint_values(
+    document: Document, place: Location, moving: tuple[str, ...]
+) -> None:
     for key in ("q_deg", "q_rad"):
-        table = at(document.data, "scan_configuration", key)
+        location = (*place, key)
+        table = at(document.data, *location)
         if not isinstance(table, dict):
             continue
-        location = ("scan_configuration", key)
         for name in table:
             if name not in moving:
                 hint = did_you_mean(name, moving)
@@ -220,6 +225,7 @@ def find_doubts(document: Document, cell: Cell, files: CellFiles) -> tuple[str, 
             doubts += _mesh_doubts(document, files, key, label, scale, location)
         elif (side := float(sides(body.shape).max())) > DOUBTFUL_M:
             doubts.append(_large(document, location, f"body {body.name!r}", side))
+    doubts += _part_doubts(document, cell, files)
     where: Location = ("bin", "inner")
     if max(cell.bin.inner) > DOUBTFUL_M:
         doubts.append(_large(document, where, "the bin", max(cell.bin.inner)))
@@ -234,6 +240,24 @@ def find_doubts(document: Document, cell: Cell, files: CellFiles) -> tuple[str, 
             where = ("robot", "urdf")
             doubts += _mesh_doubts(document, files, name, label, scale, where)
     return tuple(doubts)
+
+
+def _part_doubts(document: Document, cell: Cell, files: CellFiles) -> list[str]:
+    held = cell.held()
+    if held is None:
+        given = [n for n in ("lift", "drop_off", "cycle") if at(document.data, n)]
+        return [
+            f"{document.place((name,))}: {name} has no effect without part"
+            for name in given
+        ]
+    key, part = held
+    location: Location = ("part",) if key == "part" else ("parts", key[5:])
+    mesh, label = part.shape.mesh, "mesh of the part"
+    if mesh is not None:
+        file_key = body_key(key, mesh.file)
+        return _mesh_doubts(document, files, file_key, label, mesh.factors, location)
+    side = float(sides(part.shape).max())
+    return [_large(document, location, "the part", side)] if side > DOUBTFUL_M else []
 
 
 def _links_unchecked(

@@ -14,8 +14,10 @@ from reachmap.cell.files.joint_limits import tighten_limits
 from reachmap.cell.files.resources import SCHEME, SHIPPED, Resolver, shipped_folder
 from reachmap.cell.model.cell import Cell
 from reachmap.cell.mounting import check_bin_stands, write_out_base_pose
+from reachmap.cell.pick_cycle import joint_value_places
 from reachmap.cell.references import moving_joints
 from reachmap.cell.support import stood_on_support
+from reachmap.cell.text.data import at
 from reachmap.cell.text.messages import add_validation_errors
 from reachmap.cell.text.yaml_reader import Document
 
@@ -57,7 +59,9 @@ def resolved_cell(
     for key in ("urdf", "srdf"):
         if robot[key]:
             robot[key] = _portable(robot[key], files.resolver)
-    for mesh in (*(b["shape"]["mesh"] for b in data["bodies"]), data["bin"]["mesh"]):
+    solids = [*data["bodies"], *data["parts"].values()]
+    solids += [data["part"]] if isinstance(data["part"], dict) else []
+    for mesh in (*(solid["shape"]["mesh"] for solid in solids), data["bin"]["mesh"]):
         if mesh:
             mesh["file"] = _portable(mesh["file"], files.resolver)
     _write_out_srdf(document, data, files)
@@ -102,14 +106,16 @@ def _write_out_srdf(document: Document, data: dict[str, Any], files: CellFiles) 
             document.add(("robot", "group"), "the group has no joint that moves")
         cell_robot["joints"] = cell_robot["joints"] or names
         cell_robot["group"] = None
-    state = data["scan_configuration"]["group_state"]
-    if state is not None:
-        moving = moving_joints(data, robot, srdf)
-        values = srdf.states[state]
+    moving = moving_joints(data, robot, srdf)
+    for place in joint_value_places(data):
+        given = at(data, *place)
+        if given["group_state"] is None:
+            continue
+        values = srdf.states[given["group_state"]]
         missing = [name for name in moving if name not in values]
         if missing:
-            location = ("scan_configuration", "group_state")
+            location = (*place, "group_state")
             document.add(location, f"the state lacks joints: {', '.join(missing)}")
-        q = {name: values[name] for name in moving if name in values}
-        data["scan_configuration"] = {"q_rad": q}
+        given["q_rad"] = {name: values[name] for name in moving if name in values}
+        given["group_state"] = None
     document.raise_mistakes()

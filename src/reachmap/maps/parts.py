@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass
+from enum import IntEnum
 from typing import Any
 
 import numpy as np
@@ -163,6 +164,27 @@ class Margins:
         freeze(self)
 
 
+class StageStatus(IntEnum):
+    """What became of a stage of the cycle; the first six mean what they do elsewhere.
+
+    The stored codes never change meaning.
+    """
+
+    NOT_ATTEMPTED = 0
+    PATH_FOUND = 1
+    NO_IK = 2
+    IK_IN_COLLISION = 3
+    NO_PATH_FOUND = 4
+    ERROR = 5
+    APPROACH_BLOCKED = 6
+    PART_IN_COLLISION = 7
+    LIFT_OUT_OF_REACH = 8
+    LIFT_BLOCKED = 9
+    TRANSFER_NOT_FOUND = 10
+    DROP_OFF_UNREACHABLE = 11
+    RETURN_NOT_FOUND = 12
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Cycle:
     """What follows the grasp until the robot is back.
@@ -172,7 +194,7 @@ class Cycle:
     stages : tuple of str
         Names, in order; stage k is numbered k + 1 in the path store.
     status : uint8 array, shape (nl, ny, nx, no, stages)
-        :class:`~reachmap.maps.records.Status` codes.
+        :class:`StageStatus` codes.
     blocking_pair : int array, same shape
     time, length : array, same shape
         [s], [rad]; NaN unless the stage has a path.

@@ -17,6 +17,7 @@ from reachmap.cell.files.urdf import UrdfDescription, parse_urdf
 from reachmap.cell.files.xacro import Expansion
 from reachmap.cell.meshes.reading import MeshError, read_mesh
 from reachmap.cell.model.shapes import sides
+from reachmap.cell.pick_cycle import part_places
 from reachmap.cell.text.data import at, entries, text_at
 from reachmap.cell.text.messages import did_you_mean
 from reachmap.cell.text.yaml_reader import (
@@ -225,6 +226,9 @@ def _find_body_meshes(document: Document, files: CellFiles) -> None:
     owners: list[tuple[str, Location]] = [
         (text_at(body, "name") or str(index), ("bodies", index, "shape", "mesh"))
         for index, body in enumerate(entries(document.data, "bodies"))
+    ]
+    owners += [
+        (name, (*place, "shape", "mesh")) for name, place in part_places(document.data)
     ]
     for name, location in [*owners, ("bin", ("bin", "mesh"))]:
         reference = text_at(document.data, *location, "file")

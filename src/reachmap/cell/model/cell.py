@@ -9,11 +9,18 @@ from pydantic import Field, model_validator
 
 from reachmap._typing import FloatArray
 from reachmap.cell.model.bodies import BinSpec, BodySpec, CameraSpec
+from reachmap.cell.model.cycle import (
+    CycleSpec,
+    DropOffs,
+    DropOffSpec,
+    JointValues,
+    LiftSpec,
+    PartChoice,
+    PartSpec,
+)
 from reachmap.cell.model.fields import (
-    Angle,
     BaseOrWorld,
     Identifier,
-    Name,
     NonNegative,
     PoseSpec,
     Positive,
@@ -45,8 +52,13 @@ __all__ = [
     "Cell",
     "CollisionSpec",
     "CubeSpec",
+    "CycleSpec",
+    "DropOffSpec",
     "IkSpec",
     "JointLimits",
+    "JointValues",
+    "LiftSpec",
+    "PartSpec",
     "PlacementSpec",
     "Resources",
     "RoadmapSpec",
@@ -58,26 +70,8 @@ __all__ = [
 ]
 
 
-class ScanConfiguration(Record):
+class ScanConfiguration(JointValues):
     """Joint values the picking cycle starts from; exactly one of the three."""
-
-    q_deg: dict[str, Angle] | None = Field(
-        None, description="Joint to position [deg; m for a prismatic joint]."
-    )
-    q_rad: dict[str, Angle] | None = Field(
-        None, description="Joint to position [rad; m for a prismatic joint]."
-    )
-    group_state: Name | None = Field(None, description="A group_state of the SRDF.")
-
-    @model_validator(mode="after")
-    def _exactly_one(self) -> ScanConfiguration:
-        given = [n for n in type(self).model_fields if getattr(self, n) is not None]
-        if len(given) != 1:
-            raise ValueError(
-                "give exactly one of q_deg, q_rad, group_state "
-                f"(got {', '.join(given) or 'none'})"
-            )
-        return self
 
 
 class CollisionSpec(Record):
@@ -143,6 +137,21 @@ class Cell(Record):
     placement: PlacementSpec = Field(
         PlacementSpec(), description="Limits that place-bin keeps to."
     )
+    part: PartChoice | None = Field(
+        None,
+        description="What is picked; with it the bin scan goes on after the grasp. A "
+        "name takes one of parts.",
+    )
+    parts: dict[Identifier, PartSpec] = Field(
+        {},
+        max_length=100,
+        description="Several parts by name; the first, unless part names another.",
+    )
+    lift: LiftSpec = Field(LiftSpec(), description="How the part leaves the bin.")
+    drop_off: DropOffs | None = Field(
+        None, description="Where the part goes: one place, or a list of them."
+    )
+    cycle: CycleSpec = Field(CycleSpec(), description="Waits, and the way back.")
     seed: int = Field(1, ge=0, lt=2**63, description="Seed of everything random.")
 
     @model_validator(mode="after")
@@ -152,6 +161,31 @@ class Cell(Record):
         if repeated:
             raise ValueError(f"bodies need different names (repeated: {repeated})")
         return self
+
+    @model_validator(mode="after")
+    def _cycle_is_whole(self) -> Cell:
+        if isinstance(self.part, str) and self.part not in self.parts:
+            known = ", ".join(self.parts) or "none"
+            raise ValueError(f"part: no part {self.part!r} (parts: {known})")
+        names = [place.name for place in self.drop_offs]
+        if len(set(names)) < len(names):
+            raise ValueError(f"drop_off: names must differ (got {', '.join(names)})")
+        return self
+
+    @property
+    def drop_offs(self) -> tuple[DropOffSpec, ...]:
+        """Places that the part may go to; none where the cell has none."""
+        given = self.drop_off
+        if given is None:
+            return ()
+        return given if isinstance(given, tuple) else (given,)
+
+    def held(self) -> tuple[str, PartSpec] | None:
+        """Name and description of the part that is picked; None without one."""
+        if isinstance(self.part, PartSpec):
+            return "part", self.part
+        name = self.part or next(iter(self.parts), None)
+        return None if name is None else (f"part {name}", self.parts[name])
 
     def T_base_world(self) -> FloatArray:  # noqa: N802
         """The world in robot_base, shape (4, 4)."""

@@ -17,8 +17,6 @@ from reachmap.maps.format.layout import (
     FORMAT_VERSION,
     PROVENANCE_TEXTS,
     RUN_TEXTS,
-    STATUS_CODES,
-    STATUS_MEANINGS,
     Layout,
     Variable,
 )
@@ -186,9 +184,9 @@ def _variable_attributes(
     }
     if variable.frame:
         attributes["frame"] = variable.frame
-    if variable.is_status:
-        attributes["flag_values"] = np.array(STATUS_CODES, np.uint8)
-        attributes["flag_meanings"] = STATUS_MEANINGS
+    if variable.codes is not None:
+        attributes["flag_values"] = np.array(list(variable.codes), np.uint8)
+        attributes["flag_meanings"] = " ".join(c.name.lower() for c in variable.codes)
     if variable.is_flag:
         attributes["flag_values"] = np.array([0, 1], np.uint8)
         attributes["flag_meanings"] = "no yes"

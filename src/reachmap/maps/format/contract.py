@@ -14,7 +14,6 @@ import numpy as np
 from reachmap.maps.bytes.tree import Array, Leaf, Tree
 from reachmap.maps.format.assembly import expand
 from reachmap.maps.format.layout import COMMON_ATTRIBUTES, Layout, Variable
-from reachmap.maps.records import Status
 
 
 def check_structure(tree: Tree, layout: Layout) -> list[str]:
@@ -145,8 +144,8 @@ def _check_values(
     if variable.low is not None and (value < variable.low).any():
         problems.append(f"{path} goes below {variable.low:g}")
     high = variable.high
-    if variable.is_status:
-        high = max(Status)
+    if variable.codes is not None:
+        high = max(variable.codes)
     elif variable.is_flag:
         high = 1
     elif variable.is_index:

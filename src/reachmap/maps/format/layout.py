@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Container, Mapping
 from dataclasses import dataclass
+from enum import IntEnum
 from typing import Any, Final
 
 import numpy as np
@@ -12,9 +13,6 @@ import numpy as np
 from reachmap._typing import FloatArray
 from reachmap.maps.bytes.tree import Tree
 from reachmap.maps.records import Status
-
-STATUS_MEANINGS = " ".join(item.name.lower() for item in Status)
-STATUS_CODES = tuple(int(item) for item in Status)
 
 FORMAT_VERSION = "1.1"
 FORMAT_PREFIX = "reachmap."
@@ -46,8 +44,8 @@ class Variable:
         A coordinate has one text for each of its numbers.
     is_index : bool
         Whether the numbers count in that list.
-    is_status : bool
-        Whether the numbers are :class:`~reachmap.maps.records.Status` codes.
+    codes : type of IntEnum, or None
+        What the numbers mean, where they are codes.
     is_flag : bool
         Whether the numbers are 0 for no and 1 for yes.
     is_hidden : bool
@@ -67,7 +65,7 @@ class Variable:
     nan: bool = False
     labels: str = ""
     is_index: bool = False
-    is_status: bool = False
+    codes: type[IntEnum] | None = None
     is_flag: bool = False
     number: str = ""
     is_hidden: bool = False
@@ -287,7 +285,7 @@ def outcome(prefix: str, dims: tuple[str, ...]) -> tuple[Variable, ...]:
             dtype="u1",
             units="1",
             meaning="What became of the test frame.",
-            is_status=True,
+            codes=Status,
         ),
         Variable(
             path=f"{prefix}blocking_pair",

@@ -158,8 +158,9 @@ def _check_cycle(tree: Tree) -> list[str]:
             ~whole | (tree.array("status") == Status.PATH_FOUND),
             "cycle/stage_status must not be path_found throughout without a grasp",
         ),
+        # A cycle of the lift alone goes nowhere.
         *require(
-            ~whole | (tree.array("cycle/drop_off") >= 0),
+            ~whole | (tree.array("cycle/drop_off") >= 0) | (status.shape[-1] == 1),
             "cycle/drop_off must be given where every stage has a path",
         ),
         *check_percent(tree, "cycle/cycle_reachability", share_of(whole, attempted)),

@@ -18,6 +18,7 @@ from reachmap.maps.parts import (
     Cycle,
     Effort,
     Margins,
+    StageStatus,
 )
 
 _POINT = ("layer", "y", "x")
@@ -266,7 +267,7 @@ CYCLE = Section(
     lists={"stages": "stages"},
     arrays={
         "status": _stage(
-            "stage_status", "u1", "What became of the stage.", is_status=True, **_ONE
+            "stage_status", "u1", "What became of the stage.", codes=StageStatus, **_ONE
         ),
         "blocking_pair": _stage(
             "stage_blocking_pair",
