@@ -11,8 +11,9 @@ from reachmap.errors import SettingsError
 
 # Ends of the names that flanges and tool points have in published robot descriptions,
 # best first. A tool point comes before the flange that carries the tool.
+TOOL_POINTS = ("tcp", "tcp_link", "link_tcp")
 TIP_NAMES = (
-    *("tcp", "tcp_link", "link_tcp", "tool0", "tool_frame", "tool_link", "tool"),
+    *(*TOOL_POINTS, "tool0", "tool_frame", "tool_link", "tool"),
     *("ee_link", "link_ee", "end_effector_link", "end_effector", "eef", "link_eef"),
     *("ee_gripper_link", "ee", "flange", "flange_link", "link_flange"),
 )
@@ -90,6 +91,12 @@ def known_tip(link: str) -> int | None:
         if words[-len(parts) :] == parts:
             return rank
     return 3 if re.search(r"tool0(_|$)", link.lower()) else None
+
+
+def is_tool_point(link: str) -> bool:
+    """Whether a link is called a tool centre point, rather than what carries one."""
+    rank = known_tip(link)
+    return rank is not None and rank < len(TOOL_POINTS)
 
 
 def _flange_beyond(last: str, arms: Mapping[str, int]) -> str:

@@ -34,6 +34,10 @@ class StarterChoices:
         Other moving joints to their positions [deg or m].
     approach_axis : str
         Axis of the tip that points into the object.
+    own_roll : bool
+        Whether the arm leaves its tool no choice of its roll.
+    tool_m : float
+        From the tip to the TCP along the approach axis.
     reach_m : float
         How far the TCP gets from the base axis.
     bin_xyz_m, bin_yaw_deg : tuple of float, float
@@ -58,6 +62,8 @@ class StarterChoices:
     joints: tuple[UrdfJoint, ...]
     locked: Mapping[str, float] = field(default_factory=dict)
     approach_axis: str = "+z"
+    own_roll: bool = False
+    tool_m: float = 0.0
     reach_m: float = 1.0
     bin_xyz_m: tuple[float, float, float] | None = None
     bin_yaw_deg: float = 90.0
@@ -137,7 +143,7 @@ def _robot(c: StarterChoices) -> str:
     lines += [
         "  # GUESS: the link that carries the tool, the tool centre point in its",
         "  # frame, and the axis of it that points into the object.",
-        f"  tcp: {{parent: {scalar(c.tip)}, xyz: [0, 0, 0], "
+        f"  tcp: {{parent: {scalar(c.tip)}, xyz: {scalar(_tcp_xyz(c))}, "
         f'approach_axis: "{c.approach_axis}"}}',
     ]
     names = ", ".join(joint.name for joint in c.joints)
@@ -152,7 +158,19 @@ def _robot(c: StarterChoices) -> str:
         lines.append("  # Joints that stay where they are [deg, or m if they slide].")
         lines.append(f"  locked_joints_deg: {scalar(dict(c.locked))}")
     lines += _limits(c)
+    if c.own_roll:
+        lines += [
+            "tool:",
+            "  # The arm cannot turn its tool: the roll follows from the place.",
+            "  roll: free",
+        ]
     return "\n".join(lines) + "\n"
+
+
+def _tcp_xyz(c: StarterChoices) -> list[float]:
+    """TCP in the frame of the tip [m]."""
+    length_m = c.tool_m if c.approach_axis[0] == "+" else -c.tool_m
+    return [length_m or 0 if axis == c.approach_axis[1] else 0 for axis in "xyz"]
 
 
 def _limits(c: StarterChoices) -> list[str]:
@@ -247,15 +265,21 @@ def _scan(c: StarterChoices) -> str:
     return "\n".join(lines) + "\n"
 
 
+def _orientations(c: StarterChoices) -> str:
+    if len(c.joints) >= SIX_AXES:
+        return "{family: cone, tilts_deg: [0, 30], azimuths: [1, 8], rolls: 3}"
+    rolls = 1 if c.own_roll else 12
+    how = "at the roll that the arm has there" if c.own_roll else "in twelve rolls"
+    return (
+        f"{{family: cone, tilts_deg: [0], azimuths: [1], rolls: {rolls}}}\n"
+        f"  # Few axes reach few orientations: straight down, {how}"
+    )
+
+
 def _scans(c: StarterChoices) -> str:
     reach = max(0.05, math.ceil(c.reach_m * 20) / 20)
     layer = scalar(round(_bin_inner(c)[2] / 3, 3))
-    cone = "{family: cone, tilts_deg: [0, 30], azimuths: [1, 8], rolls: 3}"
-    if len(c.joints) < SIX_AXES:
-        cone = (
-            "{family: cone, tilts_deg: [0], azimuths: [1], rolls: 12}\n"
-            "  # Few axes reach few orientations: straight down in twelve rolls"
-        )
+    cone = _orientations(c)
     low, high = round(-0.4 * reach, 3), round(0.6 * reach, 3)
     side = round(0.85 * reach, 3)
     left = round(-0.1 * reach, 3)
@@ -274,6 +298,6 @@ bin_scan:
   layers: [{layer}]               # heights above the bottom
   orientations: {cone}
   repeats: 5
-  approach_distance_m: 0.0     # straight way before the grasp; 0: plan to the grasp
+  approach_distance_m: clear_rim   # straight way before the grasp, from above the rim
 seed: 1
 """

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from reachmap._typing import FloatArray
+from reachmap.cell.model.tool import FREE
 from reachmap.core.collision.bin_fit import BinFit
 from reachmap.core.collision.bodies import bin_placements, build_geometry
 from reachmap.core.collision.checker import CollisionChecker
@@ -91,7 +92,12 @@ class Scene:
         return cls(
             loaded=loaded,
             robot=robot,
-            kinematics=Kinematics(robot),
+            kinematics=Kinematics(
+                robot,
+                any_roll_about=(
+                    cell.robot.tcp.approach_axis if cell.tool.roll == FREE else None
+                ),
+            ),
             checker=checker,
             motions=motions,
             planner=Planner(motions, cell.planner),

@@ -73,6 +73,11 @@ def connected_grasps(scene: Scene, stages: Stages) -> BinRoadmap:
         return _survey(scene, stages, f"rolls_{next(number)}", FrameList(T=T))
 
     survey = groups.share_goals(survey)
+    if scene.kinematics.any_roll:
+        ends = survey.way[survey.way_begin + survey.way_size - 1]
+        T_goal = scene.kinematics.forward_many(ends)
+        measured = groups.measured(survey, axis, T_goal)
+        return _connected(scene, stages, "connect", measured)
     without = np.setdiff1d(groups.group, survey.frame)
     survey = groups.add_rolls(survey, without, axis, solve, until_found=True)
     known = _connected(scene, stages, "connect", survey)

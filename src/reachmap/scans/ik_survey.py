@@ -234,7 +234,7 @@ class _Surveyor:
         if self._approach.distance_m == 0:
             self._status[k] = Status.NOT_ATTEMPTED
             return [q[None] for q in Q[free]]
-        ways = [w for q in Q[free] if (w := self._way(self._T[k], q)) is not None]
+        ways = [w for q in Q[free] if (w := self._way(self._pose(k, q), q)) is not None]
         found = [
             straight
             for way in ways
@@ -247,6 +247,11 @@ class _Surveyor:
                 NO_PAIR,
             )
         return found
+
+    def _pose(self, k: int, q: FloatArray) -> FloatArray:
+        """The pose of a frame as a configuration meets it, shape (4, 4)."""
+        kinematics = self._scene.kinematics
+        return kinematics.forward(q) if kinematics.any_roll else self._T[k]
 
     def _way(self, T_base_tcp: FloatArray, q: FloatArray) -> FloatArray | None:
         """Approach of a branch, at other turns where these end at a limit."""

@@ -90,6 +90,27 @@ class RollGroups:
         group, roll = self.group[survey.frame], self.roll[survey.frame]
         return _with_goals(survey, self, group, roll, _ways(survey))
 
+    def measured(self, survey: Survey, axis: str, T_goal: FloatArray) -> Survey:
+        """Take the rolls of goals from their poses.
+
+        Parameters
+        ----------
+        survey : Survey
+            Whose groups share their goals.
+        axis : str
+            TCP axis that points into the object.
+        T_goal : array, shape (goals, 4, 4)
+            T_base_tcp of each goal at its grasp.
+        """
+        of_groups = self.T[survey.frame]
+        roll = [
+            _roll_between(R_first, R_goal, axis)
+            for R_first, R_goal in zip(
+                of_groups[:, :3, :3], T_goal[:, :3, :3], strict=True
+            )
+        ]
+        return dataclasses.replace(survey, roll=np.array(roll, float))
+
     def add_rolls(
         self,
         survey: Survey,

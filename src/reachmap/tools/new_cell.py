@@ -13,7 +13,7 @@ import numpy as np
 from reachmap._typing import FloatArray
 from reachmap.cell.files.moveit_config import planning_group
 from reachmap.cell.files.urdf import UrdfDescription
-from reachmap.cell.guesses import guess_base, guess_tip
+from reachmap.cell.guesses import guess_base, guess_tip, is_tool_point
 from reachmap.cell.loading import LoadedCell, cell_from_text
 from reachmap.cell.starter import (
     StarterChoices,
@@ -24,6 +24,7 @@ from reachmap.cell.starter import (
 )
 from reachmap.cell.text.messages import did_you_mean
 from reachmap.cell.text.yaml_writer import scalar
+from reachmap.core.kinematics.any_roll import has_own_roll
 from reachmap.core.kinematics.kinematics import Kinematics
 from reachmap.core.robot.model import RobotModel
 from reachmap.core.scene import Scene
@@ -31,6 +32,7 @@ from reachmap.errors import CellError, ReachmapError, SceneError, SettingsError
 from reachmap.geometry import quaternion_wxyz_from_rotation
 from reachmap.maps.bytes.publish import check_output, publish
 from reachmap.tools import trial
+from reachmap.tools.bin_guess import BinGuess, guess_bin
 from reachmap.tools.robot_source import RobotSource, read_source
 
 LABEL = "starter cell"
@@ -214,7 +216,7 @@ class _Attempt:
             Q = trial.as_written(arm, trial.random_configurations(arm))
             self._measure(arm, Q)
             scene = self._without_touching(Scene.build(self._loaded()), Q[:300])
-            scene = self._with_bin(scene)
+            scene = self._with_bin(scene, Q)
             return self._with_scan_configuration(scene, Q)
         except CellError:
             raise
@@ -235,12 +237,14 @@ class _Attempt:
 
     def _measure(self, arm: RobotModel, Q: FloatArray) -> None:
         kinematics = Kinematics(arm)
-        reach = trial.reach_of(kinematics, Q)
+        reach = trial.reach_of(kinematics.forward_many(Q)[:, :3, 3])
         axis = trial.approach_axis(kinematics, Q[0], reach)
+        axis = axis or self.choices.approach_axis
         self.choices = replace(
             self.choices,
             reach_m=reach,
-            approach_axis=axis or self.choices.approach_axis,
+            approach_axis=axis,
+            own_roll=has_own_roll(kinematics.chain, axis),
             bodies=tuple(_body_lines(self._source, arm)),
         )
 
@@ -258,21 +262,23 @@ class _Attempt:
         self.srdf = _srdf_text(self._source.robot.name, pairs)
         return Scene.build(self._loaded())
 
-    def _with_bin(self, scene: Scene) -> Scene:
-        """Put the bin where it is clear of what stands still."""
-        place = trial.bin_place(scene, self.choices.reach_m)
-        if place is None:
+    def _with_bin(self, scene: Scene, Q: FloatArray) -> Scene:
+        """Put the bin where it is clear of what stands still, and picked from."""
+        tip = self.choices.tip
+        guess = guess_bin(
+            Scene.build(scene.loaded, bin_moves=True),
+            scene.kinematics.forward_many(Q)[:, :3, 3],
+            with_tool=not is_tool_point(tip),
+        )
+        if guess is None:
             raise SceneError("bin.pose: the bin fits nowhere near the arm")
         self.choices = replace(
-            self.choices, bin_xyz_m=place.xyz_m, bin_yaw_deg=place.yaw_deg
+            self.choices,
+            bin_xyz_m=guess.xyz_m,
+            bin_yaw_deg=guess.yaw_deg,
+            tool_m=guess.tool_m,
         )
-        if not place.avoided:
-            return scene
-        where = ", ".join(f"{value:g}" for value in place.xyz_m)
-        self.notes.append(
-            f"the bin stands at ({where}): in front of the base it would meet "
-            f"{place.avoided}"
-        )
+        self.notes += _words(guess, tip)
         return Scene.build(self._loaded())
 
     def _with_scan_configuration(self, scene: Scene, Q: FloatArray) -> tuple[str, ...]:
@@ -309,6 +315,25 @@ class _Attempt:
             for name, values in ({} if moveit is None else moveit.states).items()
             if all(joint.name in values for joint in self.choices.joints)
         }
+
+
+def _words(guess: BinGuess, tip: str) -> list[str]:
+    """What is unusual about the bin and the tool that were guessed."""
+    if not guess.share:
+        return [f"no grasp in the bin is met, wherever it is put: {guess.why}"]
+    notes = []
+    few = "few grasps are met"
+    if guess.odd_place:
+        where = ", ".join(f"{value:g}" for value in guess.xyz_m)
+        why = few if guess.tool_m else guess.why or few
+        reason = f"it would meet {guess.avoided}" if guess.avoided else why
+        notes.append(f"the bin stands at ({where}): in front of the base {reason}")
+    if guess.tool_m:
+        notes.append(
+            f"robot.tcp is {guess.tool_m:g} m beyond {tip}, as if on a tool: at {tip} "
+            f"itself {guess.why or few}"
+        )
+    return notes
 
 
 def _below(robot: UrdfDescription, base: str) -> set[str]:

@@ -1,19 +1,16 @@
-"""Moving an arm about to see what suits it: approach axis, bin, scan configuration."""
+"""Moving an arm about to see what suits it: approach axis, touching links, view."""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
 from reachmap._typing import FloatArray
-from reachmap.core.collision.bin_fit import BinFit
 from reachmap.core.kinematics.kinematics import Kinematics
 from reachmap.core.robot.model import RobotModel
 from reachmap.core.scene import Scene
-from reachmap.geometry import AXES, yaw_transform
+from reachmap.geometry import AXES
 
 SAMPLES = 2000
 MANY = 40
@@ -106,40 +103,6 @@ def always_touching(scene: Scene, Q: FloatArray) -> list[tuple[str, str]]:
     return pairs
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class BinPlace:
-    """Where the bin can stand, and what stands in the usual place ("" if nothing)."""
-
-    xyz_m: tuple[float, float, float]
-    yaw_deg: float
-    avoided: str
-
-
-def bin_place(scene: Scene, reach_m: float) -> BinPlace | None:
-    """First place for the bin that is clear of what stands still.
-
-    In front at the base's height if it fits there; else nearer, beside the arm, behind
-    it, higher or lower. None where it fits nowhere.
-    """
-    fit = BinFit(scene.robot, scene.loaded, None)
-    avoided = ""
-    for x, y, z, yaw_deg in _places(reach_m):
-        contact = fit.contact(yaw_transform(x, y, z, np.radians(yaw_deg)))
-        if contact is None:
-            return BinPlace(xyz_m=(x, y, z), yaw_deg=yaw_deg, avoided=avoided)
-        avoided = avoided or contact.other
-    return None
-
-
-def _places(reach_m: float) -> Iterator[tuple[float, float, float, float]]:
-    for height in (0.0, 0.1, 0.2, 0.3, -0.2, -0.4, -0.6, 0.6, 1.0, 2.0):
-        for angle_deg in (0, 90, -90, 180):
-            for radius in (0.6, 0.75, 0.5):
-                r, angle = radius * reach_m, np.radians(angle_deg)
-                x, y = round(r * np.cos(angle), 3), round(r * np.sin(angle), 3)
-                yield x + 0.0, y + 0.0, round(height * reach_m, 3), 90.0 + angle_deg
-
-
 def best_view(
     scene: Scene, Q: FloatArray, axis: str, reach_m: float
 ) -> tuple[int, float] | None:
@@ -175,9 +138,8 @@ def best_view(
     return int(rows[best]), float(downwards[best])
 
 
-def reach_of(kinematics: Kinematics, Q: FloatArray) -> float:
-    """How far the TCP gets from the base axis [m]."""
-    points = kinematics.forward_many(Q)[:, :3, 3]
+def reach_of(points: FloatArray) -> float:
+    """How far the TCP gets from the base axis, of positions (n, 3) [m]."""
     return max(float(np.quantile(np.linalg.norm(points[:, :2], axis=1), 0.99)), 0.05)
 
 

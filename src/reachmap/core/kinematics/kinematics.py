@@ -7,8 +7,10 @@ import pinocchio as pin
 
 from reachmap._typing import FloatArray, IntArray
 from reachmap.cell.model.cell import IkSpec
+from reachmap.core.kinematics.any_roll import AnyRollSolver, has_own_roll
 from reachmap.core.kinematics.follow import Follower
 from reachmap.core.kinematics.solutions import within_limits
+from reachmap.core.kinematics.solvers.arm import Arm, BranchSolver
 from reachmap.core.kinematics.solvers.choice import choose_solver
 from reachmap.core.robot.chain import SerialChain
 from reachmap.core.robot.model import RobotModel
@@ -27,8 +29,15 @@ class Kinematics:
         form if there is one, also of a calibrated arm's nominal one, then a
         seven-axis arm's grid, then the numeric solver.
 
+    any_roll_about : str, optional
+        TCP axis that the tool may be turned about at will. Where the arm has fewer
+        than six axes and leaves it no choice of its roll, poses are met at whatever
+        roll the arm has there.
+
     Attributes
     ----------
+    any_roll : bool
+        Whether solutions meet position and direction of a pose at a roll of their own.
     method : str
         ``analytic``, ``nominal-analytic``, ``redundant-grid`` or ``numeric``.
     complete : bool
@@ -40,10 +49,29 @@ class Kinematics:
         The robot cannot be solved as `spec` asks.
     """
 
-    def __init__(self, robot: RobotModel, spec: IkSpec | None = None) -> None:
+    def __init__(
+        self,
+        robot: RobotModel,
+        spec: IkSpec | None = None,
+        *,
+        any_roll_about: str | None = None,
+    ) -> None:
         self.robot = robot
         self.chain = SerialChain.from_robot(robot)
-        self._solver = choose_solver(robot, self.chain, spec or robot.ik)
+        arm = Arm(
+            chain=self.chain,
+            lower=robot.lower_rad,
+            upper=robot.upper_rad,
+            joint_names=tuple(robot.joint_names),
+            spec=spec or robot.ik,
+        )
+        axis = any_roll_about
+        self.any_roll = axis is not None and has_own_roll(self.chain, axis)
+        self._solver: BranchSolver = (
+            AnyRollSolver(arm, axis)
+            if axis is not None and self.any_roll
+            else choose_solver(arm)
+        )
         self._follower = Follower(robot)
         self._data = robot.model.createData()
 

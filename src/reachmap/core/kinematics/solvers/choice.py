@@ -11,37 +11,30 @@ import numpy as np
 from reachmap.cell.model.cell import IkSpec
 from reachmap.core.kinematics import solvers
 from reachmap.core.kinematics.solvers.arm import FULL_AXES, Arm, BranchSolver, Way
-from reachmap.core.robot.chain import SerialChain
-from reachmap.core.robot.model import RobotModel
 from reachmap.errors import SceneError
 
 
-def choose_solver(robot: RobotModel, chain: SerialChain, spec: IkSpec) -> BranchSolver:
+def choose_solver(arm: Arm) -> BranchSolver:
     """Solver of an arm; made once for each arm and process.
 
     Raises
     ------
     SceneError
-        No way that `spec` allows takes the arm.
+        No way that the arm's spec allows takes it.
     """
-    return _chosen(_Key(robot, chain, spec))
+    return _chosen(_Key(arm))
 
 
 class _Key:
     """An arm, equal to arms of the same numbers."""
 
-    def __init__(self, robot: RobotModel, chain: SerialChain, spec: IkSpec) -> None:
-        self.arm = Arm(
-            chain=chain,
-            lower=robot.lower_rad,
-            upper=robot.upper_rad,
-            joint_names=tuple(robot.joint_names),
-            spec=spec,
-        )
-        arrays = (chain.T_fixed, chain.axes_base, robot.lower_rad, robot.upper_rad)
+    def __init__(self, arm: Arm) -> None:
+        self.arm, chain = arm, arm.chain
+        arrays = (chain.T_fixed, chain.axes_base, arm.lower, arm.upper)
         numbers = b"".join(np.ascontiguousarray(array).tobytes() for array in arrays)
         kinds = chain.is_revolute.tobytes()
-        self._identity = (numbers, kinds, self.arm.joint_names, spec.model_dump_json())
+        spec_json = arm.spec.model_dump_json()
+        self._identity = (numbers, kinds, arm.joint_names, spec_json)
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, _Key) and self._identity == other._identity

@@ -1,0 +1,188 @@
+"""A place for the bin of a new cell, and a tool long enough to pick from it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from reachmap._typing import BoolArray, FloatArray
+from reachmap.core.collision.bin_fit import BinFit
+from reachmap.core.scene import Scene
+from reachmap.geometry import AXES, transform_from_parts, yaw_transform
+from reachmap.maps.summary.nothing import likeliest_cause
+from reachmap.sampling.frames import FrameGrid, approach_distance_m, bin_test_frames
+from reachmap.scans.ik_survey import survey_frames
+from reachmap.tools.trial import reach_of
+
+# A place is taken where so much of a few test grasps can be met: the walls deny others
+# to any tool.
+ENOUGH = 0.4
+# Tools that are tried, in depths of the bin: a flange has to stay above the rim.
+TOOLS = (0.0, 0.5, 1.0, 2.0, 3.0)
+# A longer tool is as unusual as so many other places are.
+PLACES_PER_TOOL = 3
+# So many pairs of both are looked at before the best of them is taken.
+MOST = 60
+# Height that an arm gets above with most of its configurations, as a quantile.
+LOW = 0.1
+POINTS = np.array([[0.0, 0.0], [-0.3, -0.3], [0.3, -0.3], [-0.3, 0.3], [0.3, 0.3]])
+
+
+Place = tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BinGuess:
+    """Where the bin can stand.
+
+    Attributes
+    ----------
+    xyz_m : tuple of float
+    yaw_deg : float
+    tool_m : float
+        From the tip to the TCP along the approach axis.
+    share : float
+        Of a few test grasps, those that a free configuration meets.
+    why : str
+        Why none of them is met at the usual place without a tool; "" if one is.
+    odd_place : bool
+        Whether that is not the usual place.
+    avoided : str
+        What stands where the bin usually does; "" if nothing.
+    """
+
+    xyz_m: Place
+    yaw_deg: float
+    tool_m: float
+    share: float
+    why: str
+    odd_place: bool
+    avoided: str
+
+
+def guess_bin(scene: Scene, points: FloatArray, *, with_tool: bool) -> BinGuess | None:
+    """First place for the bin that is clear and that the arm picks from.
+
+    In front at the base's height if it fits there; else nearer, farther, at another
+    height, beside the arm or behind it; perhaps with a tool. The best of those that
+    were looked at where none is enough; None where it fits nowhere.
+
+    Parameters
+    ----------
+    scene : Scene
+        Built with ``bin_moves``, its TCP at the tip; not to be used any more.
+    points : array, shape (n, 3)
+        Where the TCP gets, in robot_base [m].
+    with_tool : bool
+        Whether the TCP may be put beyond the tip, as if on a tool.
+    """
+    fit = BinFit(scene.robot, scene.loaded, None)
+    avoided = ""
+    trials: list[_Trial] = []
+    for xyz_m, yaw_deg in _places(points):
+        contact = fit.contact(yaw_transform(*xyz_m, np.radians(yaw_deg)))
+        if contact is None:
+            trials.append(_Trial(scene, xyz_m, yaw_deg))
+        elif not trials:
+            avoided = avoided or contact.other
+    pairs = product(range(len(trials)), TOOLS[: None if with_tool else 1])
+    best: BinGuess | None = None
+    why = ""
+    for place, depths in sorted(pairs, key=_oddness)[:MOST]:
+        trial, tool_m = trials[place], depths * scene.loaded.cell.bin.inner[2]
+        share = trial.share(tool_m)
+        if best is None:
+            why = "" if share else trial.why_nothing()
+        if best is None or share > best.share:
+            best = BinGuess(
+                xyz_m=trial.xyz_m,
+                yaw_deg=trial.yaw_deg,
+                tool_m=round(tool_m, 3),
+                share=share,
+                why=why,
+                odd_place=place > 0 or bool(avoided),
+                avoided=avoided,
+            )
+        if share >= ENOUGH:
+            break
+    return best
+
+
+def _oddness(pair: tuple[int, float]) -> float:
+    """How unusual a place, counted from the most usual, and a tool are together."""
+    return pair[0] + PLACES_PER_TOOL * pair[1]
+
+
+class _Trial:
+    """A few test grasps in a bin at one place, tried with tools of several lengths."""
+
+    def __init__(self, scene: Scene, xyz_m: Place, yaw_deg: float) -> None:
+        self.xyz_m, self.yaw_deg = xyz_m, yaw_deg
+        T_base_bin = yaw_transform(*xyz_m, np.radians(yaw_deg))
+        self._bare, self._T_base_bin = scene, T_base_bin
+        cell = scene.loaded.cell
+        frames = bin_test_frames(cell, T_base_bin)
+        xy = POINTS * np.array(cell.bin.inner[:2])
+        p_bin = np.column_stack([xy, np.full(len(xy), frames.layer[0])])
+        grid = FrameGrid(
+            points=p_bin @ T_base_bin[:3, :3].T + T_base_bin[:3, 3],
+            orientations=frames.frames.orientations.copy(),
+        )
+        self._T = grid.transforms().reshape(-1, 4, 4)
+        self._approach_m = approach_distance_m(cell)
+        self._axis, self._sign = AXES[cell.robot.tcp.approach_axis]
+
+    def _scene(self) -> Scene:
+        """The scene with its bin here."""
+        moved = self._bare.loaded.with_changes(bin_pose=self._T_base_bin)
+        return self._bare.with_bin_of(moved)
+
+    def share(self, tool_m: float) -> float:
+        """Share of the grasps that are free, and free where their approach begins."""
+        scene = self._scene()
+        met = _free(scene, self._T @ self._along(-tool_m))
+        T = self._T[met] @ self._along(-tool_m - self._approach_m)
+        return float(_free(scene, T).sum() / len(self._T))
+
+    def why_nothing(self) -> str:
+        """Likeliest cause why nothing is met without a tool."""
+        scene = self._scene()
+        survey = survey_frames(scene, self._T, self._approach_m)
+        pairs = scene.checker.body_pairs
+        return likeliest_cause(survey.status, survey.blocking_pair, pairs)
+
+    def _along(self, distance_m: float) -> FloatArray:
+        """T_tcp_moved: from the TCP along its approach axis."""
+        p = np.zeros(3)
+        p[self._axis] = self._sign * distance_m
+        return transform_from_parts(np.eye(3), p)
+
+
+def _free(scene: Scene, T_base_tip: FloatArray) -> BoolArray:
+    """Whether a free configuration meets a pose, (n, 4, 4) to (n,)."""
+    Q, frame = scene.kinematics.solve_many(
+        T_base_tip, windings=False, near=scene.scan_configuration
+    )
+    free = frame[scene.checker.free_mask(Q)]
+    return np.isin(np.arange(len(T_base_tip)), free)
+
+
+def _places(points: FloatArray) -> Iterator[tuple[Place, float]]:
+    """Places around the base, and yaws, from the most usual on."""
+    reach_m = reach_of(points)
+    # An arm on a body of its own does not get down to the floor.
+    low_m = max(0.0, float(np.quantile(points[:, 2], LOW)))
+    heights_m = [share * reach_m for share in (0.0, 0.1, 0.2, 0.3, -0.2)]
+    if low_m > 0.1 * reach_m:
+        heights_m.insert(1, low_m)
+    farther_m = [share * reach_m for share in (-0.4, -0.6, 0.6, 1.0, 2.0)]
+    for angles_deg in ((0,), (90, -90, 180)):
+        for height_m, angle_deg, radius in product(
+            heights_m + farther_m, angles_deg, (0.6, 0.75, 0.5)
+        ):
+            r, angle = radius * reach_m, np.radians(angle_deg)
+            x, y = round(r * np.cos(angle), 3), round(r * np.sin(angle), 3)
+            yield (x + 0.0, y + 0.0, round(height_m, 3)), 90.0 + angle_deg
