@@ -9,11 +9,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner, Result
+from scipy.spatial.transform import Rotation
 
 from reachmap.cell.loading import read_cell
 from reachmap.cli import group
 from reachmap.core.scene import Scene
 from reachmap.geometry import AXES
+from reachmap.maps import Status, read_bin_map
+from reachmap.maps.records import BinMap
+from reachmap.sampling.frames import bin_test_frames
+from reachmap.tools.bin_scan import bin_scan
 from reachmap.tools.check import check
 
 CORNERS = ("0 0 0", "0.05 0 0", "0 0.05 0", "0 0 0.05")
@@ -392,6 +397,90 @@ def test_the_bin_keeps_out_of_the_robots_own_table(tmp_path: Path) -> None:
     made = new_cell(path, output=output)
     assert "in front of the base it would meet base_link" in made.stderr
     checked(output)
+
+
+def reached(output: Path, folder: Path) -> BinMap:
+    """Reduced bin scan of a new cell as it is."""
+    bin_scan(
+        None,
+        folder / "bin.h5",
+        cell=str(output),
+        overrides=["bin_scan.grid=[3,2]", "bin_scan.repeats=1"],
+    )
+    return read_bin_map(folder / "bin.h5")
+
+
+WIDE_WRIST = solid("0 0 0", "0.4 0.4 0.05")
+
+
+def test_a_flange_too_wide_for_the_bin_is_given_a_tool(tmp_path: Path) -> None:
+    """It could pick nothing by itself; the note says so, and the scan reaches."""
+    inside = arm(flange='xyz="0 0 0.05"').replace(
+        '<link name="tool0"/>', f'<link name="tool0">{WIDE_WRIST}</link>'
+    )
+    path = urdf(tmp_path / "arm.urdf", inside)
+    output = tmp_path / "cell.yaml"
+    made = new_cell(path, output=output)
+    tcp = read_cell(str(output)).cell.robot.tcp
+    assert tcp.xyz[:2] == (0, 0)
+    assert tcp.xyz[2] > 0.1
+    assert f"robot.tcp is {tcp.xyz[2]:g} m beyond tool0" in made.stderr
+    assert (reached(output, tmp_path).status == Status.PATH_FOUND).any()
+
+
+def test_a_tool_point_stays_where_its_maker_has_it(tmp_path: Path) -> None:
+    """A link called tcp is none that carries a tool."""
+    inside = arm(fixed("g", "tool0", "hand_tcp"), flange='xyz="0 0 0.05"').replace(
+        '<link name="tool0"/>',
+        f'<link name="tool0">{WIDE_WRIST}</link><link name="hand_tcp"/>',
+    )
+    path = urdf(tmp_path / "arm.urdf", inside)
+    made = new_cell(path, output=tmp_path / "cell.yaml")
+    assert "hand_tcp, xyz: [0, 0, 0]" in (tmp_path / "cell.yaml").read_text()
+    assert "no grasp in the bin is met, wherever it is put: nothing is" in made.stderr
+
+
+def test_an_arm_on_a_high_body_finds_its_bin_higher(tmp_path: Path) -> None:
+    """The floor is 3 m below its shoulder, and the arm 2.1 m long."""
+    high = arm().replace('xyz="0 0 0.3"', 'xyz="0 0 3"', 1)
+    path = urdf(tmp_path / "arm.urdf", high)
+    output = tmp_path / "cell.yaml"
+    new_cell(path, output=output)
+    assert read_cell(str(output)).cell.bin.pose.xyz[2] > 1.0
+    assert (reached(output, tmp_path).status == Status.PATH_FOUND).any()
+
+
+def test_four_axes_pick_at_the_roll_they_have(tmp_path: Path) -> None:
+    """Yaw and three pitches: the tool lies in the plane through the first axis."""
+    pitches = arm().split('<link name="link5"')[0].replace('"0 0 1"', '"0 1 0"')
+    inside = pitches.replace('"0 1 0"', '"0 0 1"', 1)
+    inside += fixed("t", "link4", "tool0", 'xyz="0 0 0.3"')
+    path = urdf(tmp_path / "arm.urdf", inside)
+    output = tmp_path / "cell.yaml"
+    new_cell(path, output=output)
+    loaded = read_cell(str(output))
+    assert loaded.cell.tool.roll == "free"
+    found = reached(output, tmp_path)
+    assert found.winning_roll is not None
+    hit = np.argwhere(found.status == Status.PATH_FOUND)
+    assert len(hit) >= 3
+    scene = Scene.build(loaded)
+    x, y, layer = found.x, found.y, found.layer
+    ends = np.cumsum(found.paths.row_size)
+    for grasp in hit:
+        row, j, i, _ = grasp
+        p = scene.T_base_bin @ [x[i], y[j], layer[row], 1.0]
+        q = found.paths.configuration[ends[found.best.row[tuple(grasp)]] - 1]
+        T = scene.kinematics.forward(q)
+        np.testing.assert_allclose(T[:3, 3], p[:3], atol=1e-6)
+        np.testing.assert_allclose(T[:3, 2], [0, 0, -1], atol=1e-6)
+        # Turned by the roll that the map has, the listed orientation is the true one.
+        turned = scene.kinematics.forward(q)[:3, :3]
+        grid = bin_test_frames(loaded.cell, scene.T_base_bin).frames
+        listed = Rotation.from_matrix(grid.orientations[0])
+        about = np.array([0.0, 0.0, found.winning_roll[tuple(grasp)]])
+        met = (listed * Rotation.from_rotvec(about)).as_matrix()
+        np.testing.assert_allclose(met, turned, atol=1e-5)
 
 
 def test_what_cannot_work_yet_is_written_to_be_mended(tmp_path: Path) -> None:
