@@ -167,7 +167,7 @@ class CellFields(SphinxDirective):
         text = StringList(markdown().splitlines(), source="cell model")
         container = nodes.Element()
         self.state.nested_parse(text, self.content_offset, container, match_titles=True)
-        return container.children
+        return list(container.children)
 
 
 def setup(app: Any) -> dict[str, bool]:

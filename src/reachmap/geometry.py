@@ -9,6 +9,7 @@ The few conversions are written out, as importing scipy's takes longer than rank
 from __future__ import annotations
 
 import numpy as np
+import numpy.typing as npt
 
 from reachmap._typing import FloatArray
 
@@ -23,7 +24,7 @@ AXES: dict[str, tuple[int, float]] = {
 UPRIGHT_RAD, TIE, DUST = 1e-9, 1e-6, 1e-12
 
 
-def transform_from_parts(R: FloatArray, p: FloatArray) -> FloatArray:
+def transform_from_parts(R: npt.ArrayLike, p: npt.ArrayLike) -> FloatArray:
     """Assemble homogeneous matrices.
 
     Parameters
@@ -51,7 +52,7 @@ def inverse_transform(T: FloatArray) -> FloatArray:
     return transform_from_parts(R_t, -(R_t @ T[..., :3, 3:4])[..., 0])
 
 
-def rotation_from_rpy_deg(rpy_deg: FloatArray) -> FloatArray:
+def rotation_from_rpy_deg(rpy_deg: npt.ArrayLike) -> FloatArray:
     """Roll, pitch, yaw [deg] about fixed x, y, z (the URDF order), (..., 3, 3)."""
     angles = np.radians(np.asarray(rpy_deg, float))
     (cr, cp, cy), (sr, sp, sy) = (
@@ -65,7 +66,7 @@ def rotation_from_rpy_deg(rpy_deg: FloatArray) -> FloatArray:
     return np.moveaxis(np.array(R), (0, 1), (-2, -1))
 
 
-def rotation_from_quaternion_wxyz(quaternion: FloatArray) -> FloatArray:
+def rotation_from_quaternion_wxyz(quaternion: npt.ArrayLike) -> FloatArray:
     """Rotation matrices of quaternions ``wxyz`` of any length, (..., 4) to (..., 3, 3).
 
     Raises
@@ -86,7 +87,7 @@ def rotation_from_quaternion_wxyz(quaternion: FloatArray) -> FloatArray:
     return np.moveaxis(np.array(R), (0, 1), (-2, -1))
 
 
-def quaternion_wxyz_from_rotation(R: FloatArray) -> FloatArray:
+def quaternion_wxyz_from_rotation(R: npt.ArrayLike) -> FloatArray:
     """Unit quaternions ``wxyz``, (..., 3, 3) to (..., 4).
 
     ``w >= 0``; of a half turn, the first coordinate that is not 0 is positive. The

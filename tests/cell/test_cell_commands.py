@@ -9,9 +9,10 @@ import pytest
 from click.testing import CliRunner, Result
 
 from reachmap.cell.loading import read_cell, shipped_cells
+from reachmap.cell.model.shapes import shape_text
 from reachmap.cli import group
 from reachmap.errors import CellError, SceneError
-from reachmap.tools.check import check, shape_text
+from reachmap.tools.check import check
 
 UR5 = "package://example-robot-data/robots/ur_description/urdf/ur5_robot.urdf"
 

@@ -322,14 +322,14 @@ def test_a_moveit_configuration_is_taken_over(tmp_path: Path) -> None:
     bodies = {body.name: body for body in loaded.cell.bodies}
     assert sorted(bodies) == ["bar", "old_post_1", "shelf", "table"]
     assert "scene.yaml: 'table' is in another scene, too" in made.stderr
-    assert bodies["table"].shape.box == (1, 2, 0.1)
-    assert bodies["table"].pose.xyz == (0.5, 0, -0.55)
+    assert bodies["table"].shape.box == (1.0, 2.0, 0.1)
+    assert bodies["table"].pose.xyz == (0.5, 0.0, -0.55)
     assert bodies["bar"].pose.matrix()[:3, 0] == pytest.approx([-1, 0, 0])
     assert bodies["old_post_1"].pose.xyz == (-0.6, 0.6, 0.2)
     shelf = bodies["shelf"].shape.cylinder
     assert shelf is not None
     assert (shelf.radius, shelf.length) == (0.1, 0.4)
-    assert bodies["shelf"].pose.xyz == (-1, 1, 0.2)
+    assert bodies["shelf"].pose.xyz == (-1.0, 1.0, 0.2)
     checked(output)
 
 

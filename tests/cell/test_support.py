@@ -36,9 +36,8 @@ def test_the_bin_is_put_on_the_body_it_names():
     """The outer bottom lies on the top face: height and thickness add up."""
     loaded = read_cell(UR5, [TABLE, "bin.on=pedestal"])
     bin_spec = loaded.cell.bin
-    thickness = bin_spec.wall if bin_spec.bottom is None else bin_spec.bottom
     T = loaded.cell.T_base_bin()
-    assert T[2, 3] == pytest.approx(-0.2 + thickness)
+    assert T[2, 3] == pytest.approx(-0.2 + bin_spec.bottom_m)
     faces = top_faces(loaded.cell, np.eye(4))
     assert support_of(bin_spec, T, faces) == "pedestal"
     lifted = T.copy()

@@ -66,7 +66,9 @@ def test_an_input_that_is_no_file(command: str, name: str, here: Path) -> None:
     """It is named back, without a traceback, and nothing is written."""
     before = sorted(here.iterdir())
     new = ("-o", "new.h5")
-    more = dict.fromkeys(("merge", "workspace-scan", "bin-scan"), new)
+    more: dict[str, tuple[str, ...]] = dict.fromkeys(
+        ("merge", "workspace-scan", "bin-scan"), new
+    )
     more["validate"] = ("grasps.json",)
     more["export"] = ("--all",)
     more["study"] = ("--vary", "seed=1,2")

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import re
-import sys
 from pathlib import Path
 
+import cell_fields
 import click
 import pytest
 
@@ -22,9 +22,6 @@ TEXTS = [*PAGES, ROOT / "README.md", ROOT / "CONTRIBUTING.md"]
 each_text = pytest.mark.parametrize(
     "page", TEXTS, ids=[str(page.relative_to(ROOT)) for page in TEXTS]
 )
-
-sys.path.insert(0, str(DOCS / "_ext"))
-import cell_fields  # noqa: E402
 
 
 @pytest.fixture(scope="module")

@@ -83,7 +83,8 @@ def test_the_arm_counts_only_where_its_configuration_is_known():
     """A bin in the camera housing is refused with the arm, and not without it."""
     q = SCENE.scan_configuration
     T_base_tcp = SCENE.kinematics.forward(q)
-    pose = yaw_transform(*T_base_tcp[:3, 3], 0.0)
+    x, y, z = T_base_tcp[:3, 3]
+    pose = yaw_transform(x, y, z, 0.0)
     assert FIT.contact(pose) is None
     contact = BinFit(SCENE.robot, SCENE.loaded, q).contact(pose)
     assert contact is not None

@@ -90,7 +90,8 @@ def test_a_grid_of_poses_fills_the_region(low, size):
     """The grid has both ends of each range, steps of a quarter square, no half turn."""
     low, high = np.array(low), np.array(low) + size
     region = Region(low=low, high=high)
-    grid = pose_grid(region, *(np.arange(5) * step for step in (0.1, 0.2, 0.1)))
+    x, y, z = (np.arange(5.0) * step for step in (0.1, 0.2, 0.1))
+    grid = pose_grid(region, x, y, z)
     for k, (values, step) in enumerate(
         zip((grid.x, grid.y, grid.z), (0.1, 0.2, 0.1), strict=True)
     ):

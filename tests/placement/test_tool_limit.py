@@ -7,6 +7,7 @@ import pytest
 
 from reachmap.placement.mapped.sample import open_frames
 from reachmap.placement.tool_limit import STEP_M, tool_limit
+from tests.support.optional import present
 from tests.support.scenes import scene_of
 
 UR5 = "ur5-eye-in-hand"
@@ -27,7 +28,7 @@ def test_a_longer_tube_gives_what_a_cell_with_one_has():
     cell = scene_of(UR5, *DEEP, with_bin=False).loaded.cell
     tube = next(body for body in cell.bodies if body.name == "suction tube")
     index = cell.bodies.index(tube)
-    length, z = tube.shape.cylinder.length, tube.pose.xyz[2]
+    length, z = present(tube.shape.cylinder).length, tube.pose.xyz[2]
     tcp = cell.robot.tcp.xyz
     _, longer = limit_of(
         f"bodies.{index}.shape.cylinder.length={length + STEP_M}",

@@ -33,6 +33,7 @@ from reachmap.placement.mapped.viewpoints import (
     seen_from,
     view_of,
 )
+from tests.support.optional import present
 from tests.support.pinhole import corners_of, sees
 from tests.support.scenes import scene_of
 
@@ -58,7 +59,7 @@ def looking_down(height_m, *, x=0.0, y=0.0, roll_deg=0.0):
 )
 def test_what_is_seen_against_a_pinhole(height, x, y, roll, tilt):
     """Grades say the same as projecting the corners one by one."""
-    cell, camera = CELL, CELL.camera
+    cell, camera = CELL, present(CELL.camera)
     T = looking_down(height, x=x, y=y, roll_deg=roll)
     T[:3, :3] = Rotation.from_euler("y", tilt, degrees=True).as_matrix() @ T[:3, :3]
     grade = seen_from(T[None], view_of(cell.bin.inner, cell.bin_scan.layers), camera)[0]
@@ -97,16 +98,15 @@ def test_a_range_too_short_for_the_bin_still_gives_candidates():
     view = view_of(cell.bin.inner, (0.05,))
     T = camera_poses(view, (0.5, 0.51))
     assert len(T)
-    grades = seen_from(
-        T, view, read_cell(UR5, ["camera.range_m=[0.5,0.51]"]).cell.camera
-    )
+    camera = read_cell(UR5, ["camera.range_m=[0.5,0.51]"]).cell.camera
+    grades = seen_from(T, view, present(camera))
     assert (grades == NOT_SEEN).all()
 
 
 def test_the_picture_on_a_level_is_the_field_of_view():
     """Straight down from 0.5 m the picture is 2·0.5·tan(half the angle) wide."""
-    camera = CELL.camera
-    corners = picture_corners(looking_down(0.5, x=0.2), camera, 0.0)
+    camera = present(CELL.camera)
+    corners = present(picture_corners(looking_down(0.5, x=0.2), camera, 0.0))
     size = np.ptp(corners, axis=0)
     wanted = 2 * 0.5 * np.tan(np.radians(camera.field_of_view_deg) / 2)
     assert np.allclose(size, wanted)
@@ -167,7 +167,7 @@ STANDING = (
 def test_a_standing_camera_sees_what_a_pinhole_sees():
     """The bin is in the picture where all corners of its pick volume are."""
     cell = read_cell(UR5, STANDING).cell
-    T_world_camera = cell.camera.matrix()
+    T_world_camera = present(cell.camera).matrix()
     rng = np.random.default_rng(5)
     seen = []
     for x, y, yaw in rng.uniform([0.0, -0.6, 0.0], [1.0, 0.6, np.pi], (200, 3)):
@@ -204,8 +204,8 @@ def test_the_arm_waits_where_it_does_not_hide_the_bin():
             for share in np.linspace(0.02, 0.98, 200)
         ]
         hits = [
-            arm.first_touched(coal.Sphere(1e-4), yaw_transform(*point, 0.0)) >= 0
-            for point in ways
+            arm.first_touched(coal.Sphere(1e-4), yaw_transform(x, y, z, 0.0)) >= 0
+            for x, y, z in np.array(ways)
         ]
         assert (not any(hits)) == is_free
 
@@ -220,7 +220,8 @@ def test_a_camera_may_be_fixed_to_a_body():
     T = Camera(scene.robot, scene.loaded).T_base_camera(scene.scan_configuration)
     T_base_world = scene.loaded.cell.T_base_world()
     mast_pose = T_base_world @ yaw_transform(0.4, 0.1, 1.2, 0.0)
-    np.testing.assert_allclose(T, mast_pose @ scene.loaded.cell.camera.matrix())
+    camera = present(scene.loaded.cell.camera)
+    np.testing.assert_allclose(T, mast_pose @ camera.matrix())
     with pytest.raises(CellError, match="no frame 'most'"):
         read_cell(UR5, (*STANDING, "camera.parent=most"))
 

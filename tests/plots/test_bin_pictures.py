@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections import Counter
+from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.patches import FancyArrowPatch, Polygon
 from scipy.stats import binomtest
 
 from reachmap.cell.model.orientations import ConeFamily
@@ -25,6 +27,7 @@ from reachmap.plots.parts.squares import percent_text
 from reachmap.plots.placement import draw_placement, placement_words
 from reachmap.plots.saturation import draw_saturation, saturation_of, wilson_interval
 from reachmap.sampling.orientations import approach_directions, orientation_set
+from tests.support.optional import present
 from tests.support.ranking_maps import make_bin_map
 from tests.support.synthetic_maps import (
     statuses,
@@ -62,7 +65,7 @@ def test_every_number_is_the_share_of_the_point() -> None:
         for row, y in enumerate(bin_map.y):
             for column, x in enumerate(bin_map.x):
                 tries = bin_map.path_found[0, row, column, :, :attempts]
-                share = 100.0 * np.mean([any(frame) for frame in tries])
+                share = 100.0 * float(np.mean([any(frame) for frame in tries]))
                 assert shown[float(x), float(y)] == percent_text(share)
 
 
@@ -92,7 +95,7 @@ def test_robot_is_where_the_pose_says() -> None:
     for yaw in (0.0, 0.7, np.pi / 2, 3.0, -2.0):
         bin_map = synthetic_bin_map(0.5, bin_pose=yaw_transform(0.5, 0.1, 0.0, yaw))
         axes = draw_reachability(bin_map).axes[0]
-        arrow = next(p for p in axes.patches if type(p).__name__ == "FancyArrowPatch")
+        arrow: Any = next(p for p in axes.patches if isinstance(p, FancyArrowPatch))
         (start, end) = arrow._posA_posB
         seen = np.subtract(end, start) / np.linalg.norm(np.subtract(end, start))
         robot = -bin_map.bin_pose[:2, :2].T @ bin_map.bin_pose[:2, 3]
@@ -149,7 +152,7 @@ def test_saturation_counts_what_the_first_attempts_reach() -> None:
     found = np.zeros((1, 1, 4, 5, 3), bool)
     found[0, 0, 0, :, 0] = True
     found[0, 0, 1, :, 1] = True
-    proved = found.any(axis=-1)
+    proved = np.asarray(found.any(axis=-1))
     proved[0, 0, 2] = True
     data = saturation_of(synthetic_bin_map(found, connected=proved))
     np.testing.assert_allclose(data.share, [25.0, 50.0, 50.0])
@@ -205,7 +208,7 @@ def test_sunburst_colours_are_the_states() -> None:
     for burst, status in zip(bursts, bin_map.status[0].reshape(6, 6), strict=True):
         expected = [STATUS_COLOURS[Status(int(code))].lstrip("#") for code in status]
         shown = [bytes(np.rint(c[:3] * 255).astype("u1")).hex()
-                 for c in burst.get_facecolor()]  # fmt: skip
+                 for c in np.asarray(burst.get_facecolor())]  # fmt: skip
         assert shown == expected
 
 
@@ -249,7 +252,7 @@ def test_placement_shows_bins_where_they_would_stand() -> None:
     placement = synthetic_placement()
     figure = draw_placement(placement)
     axes = figure.axes[0]
-    drawn = [p for p in axes.patches if type(p).__name__ == "Polygon"]
+    drawn = [p for p in axes.patches if isinstance(p, Polygon)]
     centres = np.array([p.get_xy()[:-1].mean(axis=0) for p in drawn])
     for index in (placement.chosen, placement.runner_up, placement.paper_choice):
         distance = np.linalg.norm(centres - placement.candidate_pose[index, :2], axis=1)
@@ -276,7 +279,7 @@ def test_directions_are_drawn_beside_frames_and_points() -> None:
 def test_clearance_is_drawn_in_millimetres() -> None:
     """The narrowest and the median of each point, averaged in the titles."""
     bin_map = bin_with_parts(synthetic_bin_map(0.6, shape=(1, 2, 3, 5, 1)))
-    clearance = 1e3 * bin_map.margins.clearance[0]
+    clearance = 1e3 * present(bin_map.margins).clearance[0]
     figure = draw_clearance(bin_map)
     titles = [axes.get_title(loc="left") for axes in figure.axes]
     for name, pick in (("Narrowest", np.nanmin), ("Median", np.nanmedian)):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 import pytest
 
@@ -25,7 +27,7 @@ def area(polygon: np.ndarray) -> float:
     return 0.5 * abs(float(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1))))
 
 
-def with_bodies(*bodies: dict[str, object], **robot: object) -> Cell:
+def with_bodies(*bodies: Mapping[str, object], **robot: object) -> Cell:
     """The shipped cell with other bodies and robot settings."""
     records = tuple(BodySpec.model_validate(body) for body in bodies)
     changed = CELL.robot.model_copy(update=robot)

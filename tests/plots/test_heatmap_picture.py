@@ -7,6 +7,7 @@ import itertools
 import numpy as np
 import pytest
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from reachmap.maps.records import Status, WorkspaceMap
@@ -14,6 +15,7 @@ from reachmap.plots.heatmap import best_frames, draw_level
 from reachmap.plots.overview import draw_overview
 from reachmap.plots.parts.levels import (
     QUANTITIES,
+    Quantity,
     best_level,
     best_patch,
     best_square,
@@ -48,17 +50,18 @@ def numbers(axes: Axes) -> dict[tuple[float, float], str]:
     return {text.get_position(): text.get_text() for text in axes.texts}
 
 
-def pixel(figure: Figure, axes: Axes, x: float, y: float) -> tuple[int, int, int]:
+def pixel(figure: Figure, axes: Axes, x: float, y: float) -> tuple[int, ...]:
     """Colour in the corner of the square at (x, y), away from its number."""
     canvas = figure.canvas
-    canvas.draw()  # type: ignore[no-untyped-call]
-    image = np.asarray(canvas.buffer_rgba())  # type: ignore[attr-defined]
+    assert isinstance(canvas, FigureCanvasAgg)
+    canvas.draw()
+    image = np.asarray(canvas.buffer_rgba())
     column, row = axes.transData.transform((x, y))
     return tuple(int(v) for v in image[image.shape[0] - 1 - int(row), int(column), :3])
 
 
 @pytest.mark.parametrize("quantity", QUANTITIES)
-def test_numbers_are_those_of_the_map(quantity: str) -> None:
+def test_numbers_are_those_of_the_map(quantity: Quantity) -> None:
     """Each square carries its own whole percent."""
     workspace = random_map()
     stack = stack_of(workspace, quantity)
@@ -231,8 +234,10 @@ def test_overview_has_a_panel_for_each_level_and_the_means() -> None:
         assert any(title.startswith(f"z = {name} m · {mean:.1f} %") for title in titles)
     assert sum("best" in title for title in titles) == 1
     curve = next(a for a in figure.axes if a.get_title(loc="left") == "mean over z")
-    np.testing.assert_allclose(curve.lines[0].get_xdata(), means)
-    np.testing.assert_allclose(curve.lines[0].get_ydata(), workspace.z)
+    np.testing.assert_allclose(np.asarray(curve.lines[0].get_xdata(), float), means)
+    np.testing.assert_allclose(
+        np.asarray(curve.lines[0].get_ydata(), float), workspace.z
+    )
 
 
 def test_percent_text_keeps_0_and_100_for_none_and_all() -> None:

@@ -8,12 +8,14 @@ import subprocess
 import sys
 import textwrap
 from collections.abc import Callable
+from typing import Literal
 
 import matplotlib as mpl
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
 from PIL import Image
+from PIL.PngImagePlugin import PngImageFile
 
 from reachmap.plots.parts.style import (
     CHANGE_MAP,
@@ -75,7 +77,7 @@ def test_not_attempted_is_grey() -> None:
 
 
 @pytest.mark.parametrize("kind", ["png", "svg"])
-def test_equal_figures_have_equal_bytes(kind: str) -> None:
+def test_equal_figures_have_equal_bytes(kind: Literal["png", "svg"]) -> None:
     """Also when the user's own matplotlib settings differ in between."""
     first = figure_bytes(small_figure(), kind, title="t", config_sha256=HASH)
     with mpl.rc_context(
@@ -90,6 +92,7 @@ def test_png_names_its_settings_and_no_software() -> None:
     """A picture can be traced to the artefact, whatever matplotlib drew it."""
     data = figure_bytes(small_figure(), "png", title="Ä title", config_sha256=HASH)
     picture = Image.open(io.BytesIO(data))
+    assert isinstance(picture, PngImageFile)
     assert picture.text["config_sha256"] == HASH
     assert picture.text["Title"] == "Ä title"
     assert "Software" not in picture.text
@@ -109,7 +112,8 @@ def test_long_titles_stay_inside_the_figure() -> None:
         put_title(figure, 0.5, "a title of many words " * 3, "short")
         box = figure.texts[0].get_window_extent()
     assert box.x1 <= 4.0 * figure.dpi
-    assert figure.texts[0].get_fontsize() < figure.texts[1].get_fontsize() * 1.2
+    title, subtitle = (float(text.get_fontsize()) for text in figure.texts)
+    assert title < subtitle * 1.2
 
 
 def test_drawing_needs_neither_pyplot_nor_a_display() -> None:

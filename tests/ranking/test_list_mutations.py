@@ -6,6 +6,7 @@ import io
 import json
 import random
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -23,7 +24,7 @@ from tests.support.ranking_maps import make_bin_map
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 RANKER = Ranker(make_bin_map(shape=(1, 2, 3)))
-ODD = [
+ODD: list[Any] = [
     None, True, False, 0, -1, 1e308, -1e308, 5e-324, 10**30, 10**400, "", "NaN", "bin",
     "\ud800", "\n", "+z", "mm", [], {}, [[]], [1, 2], [0, 0, 1], [1, 0, 0, 0],
     {"length": "mm"}, [[1, 0, 0], [0, 1, 0], [0, 0, 1]], {"position": [0, 0, 0]},

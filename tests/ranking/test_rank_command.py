@@ -7,12 +7,14 @@ import subprocess
 import sys
 from itertools import pairwise
 
+import click
 import numpy as np
 import pytest
 from click.testing import CliRunner
 
 from reachmap.cli import group
 from reachmap.ranking.lists.importers import FORMATS
+from tests.support.optional import present
 
 HEAVY = ("pinocchio", "coal", "ompl", "eaik", "matplotlib", "pydantic", "viser")
 
@@ -305,8 +307,9 @@ def test_ranking_loads_no_engine(folder):
 
 def test_formats_on_the_command_line_are_those_of_the_library():
     """--from offers what the importers know, without importing them for --help."""
-    command = group.get_command(None, "rank")
+    command = present(group.get_command(click.Context(group), "rank"))
     (option,) = [p for p in command.params if p.name == "format_name"]
+    assert isinstance(option.type, click.Choice)
     assert tuple(option.type.choices) == FORMATS
 
 

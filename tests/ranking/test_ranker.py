@@ -30,6 +30,7 @@ from reachmap.ranking.lookup.approach import axis_vector, tcp_rotation
 from reachmap.ranking.lookup.costs import outside_map
 from reachmap.ranking.lookup.order import stable_order
 from reachmap.ranking.lookup.table import quaternion_angle
+from tests.support.optional import present
 from tests.support.ranking_maps import make_bin_map
 
 BIN_MAP = make_bin_map(seed=7, reachable=0.6)
@@ -78,7 +79,8 @@ def test_terms_are_means_over_successes_over_their_scale(normalise, planning_tim
     found = m.path_found > 0
     basis = CostBasis(normalise=normalise, planning_time=planning_time)
     table = Ranker(m, basis).table
-    seconds = m.effort.checks * m.effort.seconds_per_check
+    effort = present(m.effort)
+    seconds = effort.checks * effort.seconds_per_check
     planning = seconds if planning_time == "checks" else m.planning_cpu_time
     for index, values in enumerate((m.path_length, planning, m.execution_time)):
         mean = np.nanmean(np.where(found, values, np.nan)[found.any(-1)], axis=-1)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from pathlib import Path
+from typing import Any
 
 import pytest
 from click.testing import CliRunner
@@ -26,7 +27,7 @@ def blocks(name, language):
 def test_python_of_the_how_to_pages_runs(folder, name):
     """The blocks run one after the other in a folder with a map and a list."""
     (folder / "grasps.json").write_bytes((folder / "pile-1.json").read_bytes())
-    names = {}
+    names: dict[str, Any] = {}
     exec(compile("\n".join(blocks(name, "python")), name, "exec"), names)
     if name == "own-grasps.md":
         document = json.loads((folder / "grasps.json").read_text())

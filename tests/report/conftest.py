@@ -27,7 +27,7 @@ from tests.support.synthetic_maps import (
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 SHARE = {"hits": 97, "total": 100, "share": 0.97, "low": 0.92, "high": 0.99}
-ORDER = {
+ORDER: dict[str, Any] = {
     "considered": 10, "reached": 9, "cost": 0.5, "path_length": 2.0,
     "planning_time": 0.012, "execution_time": 1.5, "calls_first": 1.1,
     "calls_top": None, "terms": {},

@@ -59,19 +59,21 @@ def cluster(folder, *, workers=2):
     dask = [sys.executable, "-m", "distributed.cli."]
     environment = {**os.environ, "PYTHONPATH": str(SCRIPT.parents[2])}
     info = folder / "scheduler.json"
-    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    null = subprocess.DEVNULL
     scheduler = subprocess.Popen(
         [*dask[:2], f"{dask[2]}dask_scheduler", "--scheduler-file", str(info),
          "--host", "127.0.0.1", "--port", "0", "--no-dashboard"],
         env=environment,
-        **quiet,
+        stdout=null,
+        stderr=null,
     )  # fmt: skip
     crew = [
         subprocess.Popen(
             [*dask[:2], f"{dask[2]}dask_worker", "--scheduler-file", str(info),
              "--nthreads", "2", "--no-dashboard", "--local-directory", str(folder)],
             env=environment,
-            **quiet,
+            stdout=null,
+            stderr=null,
         )
         for _ in range(workers)
     ]  # fmt: skip

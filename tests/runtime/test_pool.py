@@ -3,6 +3,7 @@ from __future__ import annotations
 import random
 from collections import Counter
 from concurrent.futures import BrokenExecutor, Executor, Future
+from typing import Any
 
 import pytest
 
@@ -91,13 +92,13 @@ class Scripted(Executor):
         self.cluster = cluster
         cluster.started += 1
 
-    def submit(self, fn, /, ticket, *unit):
+    def submit(self, fn, /, *args, **kwargs):
         """Keep the unit until the next step; workers are always ready."""
-        future = Future()
+        future: Future[Any] = Future()
         if fn is get_ready:
             future.set_result(1)
         else:
-            self.cluster.pending.append((future, unit[0]))
+            self.cluster.pending.append((future, args[1]))
             held = len(self.cluster.pending)
             self.cluster.most_held = max(self.cluster.most_held, held)
         return future
@@ -244,7 +245,7 @@ def test_workers_that_never_start_end_the_run():
     """A machine that cannot start workers is a defect to report, not to retry."""
 
     class Dead(Scripted):
-        def submit(self, fn, /, *arguments):
+        def submit(self, fn, /, *args, **kwargs):
             raise BrokenExecutor("died at once")
 
     cluster = Cluster(1)

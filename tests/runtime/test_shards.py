@@ -13,6 +13,7 @@ from reachmap.errors import (
     SceneError,
     SettingsError,
 )
+from reachmap.runtime.job import KINDS
 from reachmap.runtime.merge import merge_journals
 from reachmap.runtime.options import RunOptions
 from reachmap.runtime.run import run_scan
@@ -148,7 +149,7 @@ def test_no_journals_and_no_journal(output, tmp_path):
 def test_a_kind_this_version_does_not_know(output, monkeypatch):
     """A journal from a newer program is refused with the kinds there are."""
     journal = shard(output, 1, 1)
-    monkeypatch.delitem(toy_work.KINDS, "toy")
+    monkeypatch.delitem(KINDS, "toy")
     with pytest.raises(
         MapFileError, match=r"kind 'toy'; known: workspace_map, bin_map"
     ):

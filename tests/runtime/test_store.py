@@ -1,9 +1,11 @@
 from __future__ import annotations
 
 import errno
+import fcntl
 import json
 import os
 import random
+from pathlib import Path
 
 import pytest
 
@@ -178,8 +180,8 @@ def test_a_power_cut_loses_what_was_not_synced_and_no_more(path, monkeypatch):
         written.clear()
 
     safe = [b""]
-    monkeypatch.setattr(store_module.os, "pwrite", pwrite)
-    monkeypatch.setattr(store_module.os, "fsync", fsync)
+    monkeypatch.setattr(os, "pwrite", pwrite)
+    monkeypatch.setattr(os, "fsync", fsync)
     cuts = 0
     for _ in range(40):
         path.unlink(missing_ok=True)
@@ -402,7 +404,8 @@ def test_a_second_run_is_refused_while_the_first_writes(path):
 def test_a_journal_removed_while_waiting_for_its_lock_is_made_anew(path, monkeypatch):
     """The lock of a file that was just unlinked by its owner is worth nothing."""
     fill(path, [0])
-    lock, removed = store_module._lock, []
+    lock = store_module._lock
+    removed: list[Path] = []
 
     def lock_late(where, descriptor):
         if not removed:
@@ -423,7 +426,7 @@ def test_a_file_system_without_locks_is_warned_about(path, monkeypatch, caplog):
     def no_locks(descriptor, how):
         raise OSError(errno.ENOLCK, "No locks available")
 
-    monkeypatch.setattr(store_module.fcntl, "flock", no_locks)
+    monkeypatch.setattr(fcntl, "flock", no_locks)
     fill(path, [0])
     assert "no locks" in caplog.text
 
@@ -449,7 +452,7 @@ def test_no_room_for_a_line_leaves_the_journal_whole(path, monkeypatch):
         return real(descriptor, data[: room - offset], offset)
 
     fill(path, [])
-    monkeypatch.setattr(store_module.os, "pwrite", small_disk)
+    monkeypatch.setattr(os, "pwrite", small_disk)
     with pytest.raises(IncompleteError, match=r"No space left.*are safe.*free some"):
         fill(path, range(20))
     monkeypatch.undo()
@@ -466,7 +469,7 @@ def test_no_room_for_the_header_is_an_output_error(path, monkeypatch):
     def full(descriptor, data, offset):
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr(store_module.os, "pwrite", full)
+    monkeypatch.setattr(os, "pwrite", full)
     with (
         pytest.raises(OutputError, match="No space left"),
         open_store(path, header()),

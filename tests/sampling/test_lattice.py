@@ -108,6 +108,6 @@ def test_pooling_agrees_with_a_dictionary_of_points(data: st.DataObject) -> None
     pooled = stitching.pool(counts)
     points = stitching.lattice.points().reshape(-1, 3)
     found = {tuple(p): c for p, c in zip(points, pooled.ravel(), strict=True)}
-    for point, count in found.items():
-        assert count == pytest.approx(expected.pop(point, 0.0))
+    for point, total in found.items():
+        assert total == pytest.approx(expected.pop(point, 0.0))
     assert not expected

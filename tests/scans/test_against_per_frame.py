@@ -7,12 +7,17 @@ import pytest
 
 from reachmap.core.planning.shortcut import shorten
 from reachmap.maps import Status
-from reachmap.sampling.frames import bin_test_frames, workspace_frames
+from reachmap.sampling.frames import (
+    approach_distance_m,
+    bin_test_frames,
+    workspace_frames,
+)
 from reachmap.scans.bin_scan import plan_from_scratch
 from reachmap.scans.ik_survey import survey_frames
 from reachmap.scans.workspace_per_frame import plan_frames
 from reachmap.scans.workspace_roadmap import connect_survey, path_to_frame
 from tests.support.dense_checks import dense_free
+from tests.support.optional import present
 from tests.support.scenes import scene_of
 
 SAMPLE = 300
@@ -47,7 +52,7 @@ def test_the_roadmap_misses_nothing_that_planning_finds():
     for frame in only_roadmap:
         path = path_to_frame(survey, connection, int(frame))
         rng = np.random.default_rng(int(frame))
-        short = shorten(path, scene.motions.is_verified, tries=20, rng=rng)
+        short = shorten(present(path), scene.motions.is_verified, tries=20, rng=rng)
         assert replay_is_free(scene, short)
 
 
@@ -60,9 +65,7 @@ def test_another_seed_reaches_the_same_test_grasps():
     cell = scene.loaded.cell
     grid = bin_test_frames(cell, scene.T_base_bin).frames
     rows = np.random.default_rng(12).permutation(grid.size)[:200]
-    survey = survey_frames(
-        scene, grid.transforms_at(rows), cell.bin_scan.approach_distance_m
-    )
+    survey = survey_frames(scene, grid.transforms_at(rows), approach_distance_m(cell))
     disputed = 0
     every = range(len(rows))
     for first, second in zip(

@@ -15,7 +15,7 @@ import pytest
 from reachmap.cell.loading import read_cell
 from reachmap.core.scene import Scene
 from reachmap.maps import Status
-from reachmap.sampling.frames import bin_test_frames
+from reachmap.sampling.frames import approach_distance_m, bin_test_frames
 from reachmap.scans.ik_survey import survey_frames
 from reachmap.scans.workspace_roadmap import component_of_frames, connect_survey
 
@@ -49,7 +49,7 @@ def test_what_is_reachable_is_reached(name):
     survey = survey_frames(
         scene,
         grid.transforms_at(np.arange(grid.size)),
-        cell.bin_scan.approach_distance_m,
+        approach_distance_m(cell),
     )
     reachable, budget = KNOWN[name]
     for seed in (1, 2, 3):

@@ -28,9 +28,8 @@ def test_everything_but_the_poisoned_unit_is_there(tmp_path, monkeypatch):
             tool.bin_scan(None, path, cell=cell, overrides=FEW, run=run)
     assert failure.value.exit_code == 3
     part = read_bin_map(path)
-    lost = np.zeros(whole.status.size, bool)
-    lost[poisoned_bin.POISONED * GRASPS_PER_UNIT :][:GRASPS_PER_UNIT] = True
-    lost = lost.reshape(whole.status.shape)
+    lost = np.zeros(whole.status.shape, bool)
+    lost.flat[poisoned_bin.POISONED * GRASPS_PER_UNIT :][:GRASPS_PER_UNIT] = True
     assert (part.status[lost] == Status.ERROR).all()
     np.testing.assert_array_equal(part.status[~lost], whole.status[~lost])
     np.testing.assert_array_equal(part.path_length[~lost], whole.path_length[~lost])

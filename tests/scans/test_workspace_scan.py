@@ -14,6 +14,7 @@ from reachmap.tools.workspace_scan import (
     summary_of_workspace,
     workspace_scan,
 )
+from tests.support.optional import present
 from tests.support.toy_closed_form import margin, verdict
 
 MEANING = {
@@ -117,7 +118,8 @@ def test_reachable_frames_of_the_ur5_have_verified_goals(tmp_path):
 
 def test_the_summary_names_the_best_level(tmp_path):
     """The headline has the level with the best average."""
-    result = workspace_scan("ur5-eye-in-hand", tmp_path / "w.h5", overrides=UR5_FEW)
+    scan = workspace_scan("ur5-eye-in-hand", tmp_path / "w.h5", overrides=UR5_FEW)
+    result = present(scan)
     facts = summary_of_workspace(result)
     means = result.path_reachability.mean(axis=(1, 2))
     assert facts["best_level_m"] == result.z[np.argmax(means)]

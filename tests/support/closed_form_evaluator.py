@@ -5,12 +5,12 @@ from tests.support.closed_form_evaluator import ClosedForm
 
 from __future__ import annotations
 
-from reachmap.placement.mapped.evaluator import Evaluation
+from reachmap.placement.mapped.evaluator import Evaluation, Evaluator
 from reachmap.placement.mapped.exact import ALWAYS, NEVER, PoseScore
 from reachmap.placement.mapped.sample import COARSE
 
 
-class ClosedForm:
+class ClosedForm(Evaluator):
     """Scores poses by a formula, and keeps to what an evaluator promises.
 
     Parameters
@@ -30,7 +30,7 @@ class ClosedForm:
         self.formula = formula
         self.asked = []
         self.expected = []
-        self._known = {}
+        self._scored = {}
 
     def expect(self, poses):
         """Keep what was announced."""
@@ -40,7 +40,7 @@ class ClosedForm:
         """Score poses; those not above a score have none."""
         least = above if isinstance(above, list) else [above] * len(poses)
         return [
-            self._known.get((grid, pose)) or self._one(pose, bound, grid)
+            self._scored.get((grid, pose)) or self._one(pose, bound, grid)
             for pose, bound in zip(poses, least, strict=True)
         ]
 
@@ -54,5 +54,5 @@ class ClosedForm:
         score = PoseScore(
             score=value, worst_point=value, reachable_share=100.0, path_length_rad=1.0
         )
-        self._known[grid, pose] = Evaluation(bound=value, score=score)
-        return self._known[grid, pose]
+        self._scored[grid, pose] = Evaluation(bound=value, score=score)
+        return self._scored[grid, pose]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import distribution
@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 
-from reachmap._typing import FloatArray
+from reachmap._typing import FloatArray, IntArray
 from reachmap.cell.model.cell import RobotSpec
 from reachmap.core.robot.model import RobotModel
 
@@ -41,7 +41,7 @@ def urdf_text(name: str) -> str:
     return (ROBOTS / name).read_text(encoding="utf-8")
 
 
-def robot(urdf: str, tcp: dict[str, object] | str, **spec: object) -> RobotModel:
+def robot(urdf: str, tcp: Mapping[str, object] | str, **spec: object) -> RobotModel:
     """Robot of a URDF text; accelerations are 5 rad/s² unless given."""
     spec.setdefault("limits", {"acceleration_rad_s2": 5.0})
     tcp = {"parent": tcp} if isinstance(tcp, str) else tcp
@@ -112,7 +112,7 @@ def turns_apart(difference: FloatArray) -> FloatArray:
     return np.abs((difference + np.pi) % (2 * np.pi) - np.pi)
 
 
-def nearest_branch(Q: FloatArray, frame: FloatArray, wanted: FloatArray) -> FloatArray:
+def nearest_branch(Q: FloatArray, frame: IntArray, wanted: FloatArray) -> FloatArray:
     """Distance of the nearest solution to a wanted one, per frame, shape (n,)."""
     nearest = np.full(len(wanted), np.inf)
     apart = turns_apart(Q - wanted[frame]).max(axis=1)

@@ -7,6 +7,7 @@ import os
 import signal
 
 from reachmap.scans import bin_scan
+from tests.support.optional import present
 
 POISONED = 1
 
@@ -23,6 +24,6 @@ def bin_work(*arguments):
     work = bin_scan.bin_work(*arguments)
 
     def job(stages):
-        return dataclasses.replace(work.job(stages), function=plan_unit)
+        return dataclasses.replace(present(work.job(stages)), function=plan_unit)
 
     return dataclasses.replace(work, job=job)

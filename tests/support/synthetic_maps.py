@@ -89,7 +89,7 @@ def synthetic_stamp(seed: int = 1) -> Stamp:
     return Stamp(seed=seed, cell_sha256="c" * 64, config_sha256="d" * 64)
 
 
-def statuses(reachable: np.ndarray) -> np.ndarray:
+def statuses(reachable: Any) -> np.ndarray:
     """Status codes (uint8) for a boolean array; causes take turns."""
     turn = np.arange(reachable.size).reshape(reachable.shape) % len(CAUSES)
     causes = np.array([int(cause) for cause in CAUSES], np.uint8)[turn]
@@ -102,7 +102,7 @@ def frames_from_fraction(fraction: np.ndarray, orientations: int) -> np.ndarray:
     return np.arange(orientations) < count[..., None]
 
 
-def _outcome(status: np.ndarray) -> dict[str, np.ndarray]:
+def _outcome(status: np.ndarray) -> dict[str, Any]:
     """Solutions and blocking pairs that go with a status."""
     collision = status == Status.IK_IN_COLLISION
     turn = np.arange(status.size).reshape(status.shape) % len(BODY_PAIRS)
@@ -230,20 +230,20 @@ def synthetic_bin_map(
         layers=tuple(0.05 * (1 + np.arange(nl))),
         orientations=ConeFamily(tilts_deg=(20.0,), azimuths=(no,), rolls=1),
     )
-    cell = Cell.model_construct(
-        robot=RobotSpec(urdf="arm.urdf", tcp=TcpSpec(parent="tool")),
-        bin=BinSpec(inner=(0.36, 0.26, 0.15)),
-        bin_scan=spec,
-    )
+    fields: dict[str, Any] = {
+        "robot": RobotSpec(urdf="arm.urdf", tcp=TcpSpec(parent="tool")),
+        "bin": BinSpec(inner=(0.36, 0.26, 0.15)),
+        "bin_scan": spec,
+    }
+    cell = Cell.model_construct(**fields)
     frames = bin_test_frames(cell, T_base_bin)
     T = frames.T_base_tcp
-    proved = found.any(axis=-1) if connected is None else np.asarray(connected, bool)
-    status = statuses(found.any(axis=-1) | proved) if status is None else status
+    tried = np.asarray(found.any(axis=-1))
+    proved = tried if connected is None else np.asarray(connected, bool)
+    status = statuses(tried | proved) if status is None else status
     paths = synthetic_paths(found, rng)
     values = _path_values(found, paths, rng)
-    goal = np.where(
-        found.any(axis=-1)[..., None], rng.uniform(-3, 3, (*status.shape, 6)), np.nan
-    )
+    goal = np.where(tried[..., None], rng.uniform(-3, 3, (*status.shape, 6)), np.nan)
     attempted = (status != Status.NOT_ATTEMPTED).sum(axis=-1)
     hits = (status == Status.PATH_FOUND).sum(axis=-1)
     percent = np.where(attempted > 0, 100.0 * hits / np.maximum(attempted, 1), np.nan)
@@ -288,13 +288,13 @@ def synthetic_paths(found: np.ndarray, rng: np.random.Generator) -> PathStore:
 
 def _path_values(
     found: np.ndarray, paths: PathStore, rng: np.random.Generator
-) -> dict[str, np.ndarray]:
+) -> dict[str, Any]:
     whole, planned = path_lengths(
         paths.configuration, paths.row_size, paths.planned_size
     )
     place = tuple(paths.index.T)
     lengths = {"path_length": whole, "path_length_planned": planned}
-    values = {}
+    values: dict[str, Any] = {}
     for name, length in lengths.items():
         values[name] = np.full(found.shape, np.nan)
         values[name][place] = length

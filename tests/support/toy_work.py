@@ -15,6 +15,7 @@ import sys
 import time
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -182,12 +183,11 @@ def main():
     parser.add_argument("--overwrite", action="store_true")
     parser.add_argument("--shard", default="")
     options = vars(parser.parse_args())
-    toy = Toy(
-        **{
-            key: tuple(value) if isinstance(value, list) else value
-            for key, value in json.loads(options.pop("toy")).items()
-        }
-    )
+    given: dict[str, Any] = {
+        key: tuple(value) if isinstance(value, list) else value
+        for key, value in json.loads(options.pop("toy")).items()
+    }
+    toy = Toy(**given)
     shard = options.pop("shard")
     options["shard"] = tuple(map(int, shard.split("/"))) if shard else None
     logging.getLogger("reachmap").setLevel(logging.INFO)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 
+import numpy as np
 import pytest
 from click.testing import CliRunner
 
@@ -78,7 +79,7 @@ def test_the_cell_may_be_changed(folder):
 )
 def test_refusals_say_what_is_wrong(folder, arguments, message):
     """Exit code 2, one line each, before anything is planned."""
-    (folder / "none.json").write_text(json.dumps(toy_grasps([])))
+    (folder / "none.json").write_text(json.dumps(toy_grasps(np.zeros((0, 3)))))
     (folder / "there.json").write_text("{}")
     result = run(*arguments)
     assert result.exit_code == 2

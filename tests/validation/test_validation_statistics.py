@@ -7,7 +7,7 @@ from itertools import product
 import numpy as np
 import pytest
 
-from reachmap.maps.summary.statistics import Z_95
+from reachmap.maps.comparison.significance import Z_95
 from reachmap.validation.statistics import (
     confusion_of,
     expected_calls,

@@ -16,6 +16,7 @@ from reachmap.view.playback import (
     playback_of,
 )
 from reachmap.view.points import shortest_paths
+from tests.support.optional import present
 from tests.support.synthetic_maps import synthetic_bin_map
 from tests.support.synthetic_parts import bin_with_parts
 from tests.support.toy_artefacts import toy_bin_map
@@ -44,7 +45,7 @@ def test_a_playback_takes_the_execution_time(playbacks: list[Playback]) -> None:
     for row, playback in enumerate(playbacks):
         place = tuple(record.paths.index[row])
         at_grasp = record.execution_time[place]
-        out = at_grasp + record.times.retreat[place]
+        out = at_grasp + present(record.times).retreat[place]
         assert playback.time_s[playback.grasp] == pytest.approx(at_grasp)
         assert playback.time_s[-1] == pytest.approx(out)
         assert (np.diff(playback.time_s) > 0).all()
@@ -122,8 +123,9 @@ def test_a_path_is_found_by_its_test_grasp() -> None:
     with pytest.raises(SettingsError, match="no such test grasp"):
         find_path(record, (0, 99, 0, 0))
     without = np.argwhere(record.path_found.sum(axis=-1) == 0)
+    layer, y, x, orientation = without[0].tolist()
     with pytest.raises(SettingsError, match="no path to this test grasp"):
-        find_path(record, tuple(int(i) for i in without[0]))
+        find_path(record, (layer, y, x, orientation))
 
 
 def test_the_best_path_is_the_one_to_watch() -> None:
@@ -131,7 +133,7 @@ def test_the_best_path_is_the_one_to_watch() -> None:
     record = bin_with_parts(
         synthetic_bin_map(0.3, connected=np.ones((1, 4, 5, 6), bool))
     )
-    np.testing.assert_array_equal(shortest_paths(record), record.best.row)
+    np.testing.assert_array_equal(shortest_paths(record), present(record.best).row)
     assert len(choose_paths(record)) == 4
     own = tuple(np.argwhere(~record.path_found.any(axis=-1))[0])
     assert record.paths.index[find_path(record, own)].tolist() == [*own, -1]

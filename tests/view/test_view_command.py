@@ -143,7 +143,7 @@ def app(request: pytest.FixtureRequest) -> Iterator[Any]:
     from reachmap.view.app import App
     from reachmap.view.engine import start_server, stop_server
 
-    record = {"bin": toy_bin_map, "workspace": toy_workspace}[request.param]()
+    record = toy_bin_map() if request.param == "bin" else toy_workspace()
     server = start_server(0)
     cell = SolidCell.build(cell_of_artefact(record.provenance, "toy"))
     yield App(server, record, cell)

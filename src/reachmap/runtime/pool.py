@@ -50,7 +50,7 @@ class Slot:
         Makes the executor, and a new one after its workers died.
     """
 
-    is_wide: ClassVar[bool] = True
+    is_wide: bool = True
     """Whether several units may be in flight, so that a death has several suspects."""
     is_here: ClassVar[bool] = False
     """Whether it works in this process."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 
 import pinocchio as pin
@@ -20,7 +21,7 @@ JOINT = (
 LIMIT = '<limit lower="-1" upper="1" velocity="1" effort="1"/>'
 
 
-def robot(*parts: str, links: str = "abcd") -> str:
+def robot(*parts: str, links: Iterable[str] = "abcd") -> str:
     """A URDF of single-letter links and the given joints."""
     inside = "".join(f'<link name="{name}"/>' for name in links) + "".join(parts)
     return f'<robot name="r">{inside}</robot>'

@@ -186,7 +186,7 @@ def test_meshes_of_several_parts_are_whole() -> None:
     robots = folder / "example-robot-data" / "robots"
     path = robots / "laikago_description" / "meshes" / "trunk.obj"
     ours = read_mesh(path.read_bytes(), ".obj")
-    assert area(ours) == pytest.approx(trimesh.load(path, force="mesh").area, rel=1e-6)
+    assert area(ours) == pytest.approx(trimesh.load_mesh(path).area, rel=1e-6)
     assert area(coal_mesh(path)) > 2 * area(ours)  # why it does not read files here
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from reachmap.cell.loaded import LoadedCell
 from reachmap.cell.loading import cell_from_json, cell_from_text, read_cell
 from reachmap.cell.text.expressions import Evaluator, ExpressionError
 from reachmap.errors import CellError
@@ -29,7 +30,7 @@ def toy(head: str = HEAD, bottom: str = '"=half / 5"') -> str:
     return "\n".join(lines) + "\n"
 
 
-def load(text: str, *overrides: str) -> object:
+def load(text: str, *overrides: str) -> LoadedCell:
     """Load a text as a file of the toy's folder."""
     return cell_from_text(
         text, label="toy.yaml", directory=TOY.parent, overrides=overrides

@@ -6,7 +6,9 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from reachmap._typing import FloatArray
 from reachmap.cell.model.bin_parts import bin_parts
+from reachmap.cell.model.shapes import sides
 from reachmap.core.collision.bodies import build_geometry
 from reachmap.core.collision.checker import LADDER_M
 from tests.support.scenes import scene_of
@@ -76,7 +78,7 @@ def test_a_clear_configuration_stays_free_within_its_distance():
     """Motions by less than a proved distance never collide, on the meshes."""
     scene = scene_of("ur5-eye-in-hand")
     checker, rng = scene.checker, np.random.default_rng(6)
-    moved = []
+    moved: list[FloatArray] = []
     while len(moved) < 300:
         q = scene.scan_configuration + rng.normal(0, 0.6, 6)
         step = LADDER_M[int(rng.integers(len(LADDER_M)))]
@@ -102,7 +104,7 @@ def test_answers_do_not_depend_on_what_was_asked_before():
 def _on_the_brink(scene, rng, count):
     """Free and colliding configurations that are neighbours to the last digits."""
     robot, is_free = scene.robot, scene.checker.is_free
-    brink = []
+    brink: list[FloatArray] = []
     while len(brink) < 2 * count:
         free = scene.scan_configuration
         touching = np.clip(free + rng.normal(size=6), robot.lower_rad, robot.upper_rad)
@@ -123,12 +125,12 @@ def test_the_bin_is_five_boxes_around_its_inner_volume():
     spec = scene_of("ur5-eye-in-hand").loaded.cell.bin
     boxes = bin_parts(spec)
     x, y, depth = spec.inner
-    bottom = spec.bottom or spec.wall
-    outer = (x + 2 * spec.wall) * (y + 2 * spec.wall) * (depth + bottom)
-    volume = sum(np.prod(box.shape.box) for box in boxes)
+    wall_x, wall_y = spec.walls
+    outer = (x + 2 * wall_x) * (y + 2 * wall_y) * (depth + spec.bottom_m)
+    volume = sum(float(np.prod(sides(box.shape))) for box in boxes)
     assert volume == pytest.approx(outer - x * y * depth)
     rng = np.random.default_rng(8)
     points = rng.uniform([-x / 2, -y / 2, 0], [x / 2, y / 2, depth], (2000, 3))
     for box in boxes:
-        inside = np.abs(points - box.centre_m) < np.array(box.shape.box) / 2 - 1e-9
+        inside = np.abs(points - box.centre_m) < sides(box.shape) / 2 - 1e-9
         assert not inside.all(axis=1).any()

@@ -53,7 +53,7 @@ def planar_pose(x: float, y: float, yaw: float) -> np.ndarray:
 def test_the_toy_arm_has_the_solutions_of_its_closed_form(method: str) -> None:
     """Both elbows inside the ring of reach, none outside, by either method."""
     arm = RobotModel.from_cell(read_cell("planar-toy"))
-    kinematics = Kinematics(arm, IkSpec(method=method))  # type: ignore[arg-type]
+    kinematics = Kinematics(arm, IkSpec(method=method))
     rng = np.random.default_rng(0)
     poses = rng.uniform([-0.7, -0.7, -np.pi], [0.7, 0.7, np.pi], (60, 3))
     T = np.array([planar_pose(*pose) for pose in poses])
@@ -70,7 +70,7 @@ def test_the_toy_arm_has_the_solutions_of_its_closed_form(method: str) -> None:
 def test_poses_out_of_the_plane_are_not_solved(method: str) -> None:
     """A planar arm meets a pose fully or not at all."""
     arm = RobotModel.from_cell(read_cell("planar-toy"))
-    kinematics = Kinematics(arm, IkSpec(method=method))  # type: ignore[arg-type]
+    kinematics = Kinematics(arm, IkSpec(method=method))
     above = planar_pose(0.3, 0.2, 0.5)
     above[2, 3] = 1e-5
     tilted = planar_pose(0.3, 0.2, 0.5)
@@ -221,7 +221,10 @@ def test_arms_at_random_are_solved_or_declined(seed: int) -> None:
     rng = np.random.default_rng(seed)
     dof = int(rng.integers(1, 7))
     links = [
-        Link(xyz=rng.choice([0, 0, 0.2, 0.3], 3), axis=np.eye(3)[rng.integers(3)])
+        Link(
+            xyz=rng.choice([0, 0, 0.2, 0.3], 3).tolist(),
+            axis=np.eye(3)[rng.integers(3)],
+        )
         for _ in range(dof)
     ]
     tcp = {"parent": f"link_{dof}", "xyz": rng.choice([0, 0.1, 0.25], 3).tolist()}

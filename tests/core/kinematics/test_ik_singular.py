@@ -12,7 +12,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from reachmap._typing import FloatArray
+from reachmap._typing import BoolArray, FloatArray, IntArray
 from reachmap.core.kinematics.kinematics import Kinematics
 from tests.support import ur_closed_form
 from tests.support.kinematics_arms import misses, nearest_branch, turns_apart, ur5
@@ -100,7 +100,7 @@ def test_curves_of_solutions_are_met(kinematics: Kinematics, case: str) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("case", {**ISOLATED, **CURVES})
+@pytest.mark.parametrize("case", [*ISOLATED, *CURVES])
 def test_rates_on_many_singular_poses(kinematics: Kinematics, case: str) -> None:
     """The same for 1,000 poses a case: all solved, 99 % on the branch of joint 1."""
     Q = posed({**ISOLATED, **CURVES}[case], 1000)
@@ -115,7 +115,7 @@ def test_rates_on_many_singular_poses(kinematics: Kinematics, case: str) -> None
     assert case in CURVES or near >= 0.999
 
 
-def same_first_joint(Q: FloatArray, found: FloatArray, frame: FloatArray) -> FloatArray:
+def same_first_joint(Q: FloatArray, found: FloatArray, frame: IntArray) -> BoolArray:
     """Whether a solution has the original's joint 1, per frame."""
     near = turns_apart(found[:, 0] - Q[frame, 0]) < 1e-4
     return np.isin(np.arange(len(Q)), frame[near])

@@ -79,7 +79,7 @@ def test_five_axes_with_rounded_angles_reach_what_exact_ones_do(method: str) -> 
     exact, rounded = five_axes(QUARTER), five_axes(1.5708)
     T = vertical_tools()
     wanted = np.unique(exact.solve_many(T)[1])
-    numeric = Kinematics(rounded.robot, IkSpec(method=method))  # type: ignore[arg-type]
+    numeric = Kinematics(rounded.robot, IkSpec(method=method))
     found, frame = numeric.solve_many(T)
     np.testing.assert_array_equal(np.unique(frame), wanted)
     assert 60 < len(wanted) < len(T) - 60

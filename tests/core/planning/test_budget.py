@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
+from reachmap.core.collision.checker import CollisionChecker
 from reachmap.core.planning.ompl import Budget
 
 
-@dataclass
-class Counter:
+class Counter(CollisionChecker):
     """What a budget reads of a checker."""
 
-    checks: int = 0
+    def __init__(self, checks=0):
+        self.checks = checks
 
 
 def checks_until(end, counter, step=1):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from reachmap._typing import FloatArray
 from reachmap.core.planning.motion import MotionChecker
 from tests.support.dense_checks import dense_free
 from tests.support.scenes import scene_of
@@ -13,7 +14,7 @@ from tests.support.scenes import scene_of
 def random_motions(scene, count, seed, spread):
     """Motions between free configurations around the scan configuration."""
     rng = np.random.default_rng(seed)
-    free = []
+    free: list[FloatArray] = []
     while len(free) < count + 1:
         q = scene.scan_configuration + rng.normal(0, spread, scene.robot.dof)
         if scene.checker.is_free(q):

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from reachmap.cell.model.roadmap import RoadmapSpec
+from reachmap.core.planning.motion import MotionChecker
 from reachmap.core.planning.routes import (
     RouteNetwork,
     pieces,
@@ -19,10 +20,16 @@ SHORTEST = 2 * np.sqrt(3) + np.pi / 3
 SPEC = RoadmapSpec(ways=2, way_tries=60)
 
 
-class PlaneWithDisc:
+class PlaneWithDisc(MotionChecker):
     """Motions of a point in the plane that has to keep out of the unit disc."""
 
-    is_proof = True
+    def __init__(self):
+        """Nothing to build."""
+
+    @property
+    def is_proof(self):
+        """Distances are exact."""
+        return True
 
     def is_verified(self, q_from, q_to):
         """Distance of a segment to the origin, in closed form."""

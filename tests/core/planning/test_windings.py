@@ -16,7 +16,7 @@ from reachmap.core.planning.connection import connect
 from reachmap.core.planning.roadmap import Goals
 from reachmap.core.scene import Scene
 from reachmap.maps import Status
-from reachmap.sampling.frames import bin_test_frames
+from reachmap.sampling.frames import approach_distance_m, bin_test_frames
 from reachmap.scans.ik_survey import survey_frames
 from reachmap.scans.workspace_roadmap import connect_survey, path_to_frame
 
@@ -126,7 +126,7 @@ def test_a_real_arm_swings_round_its_back():
     cell = scene.loaded.cell
     grid = bin_test_frames(cell, scene.T_base_bin).frames
     T = grid.transforms_at(np.arange(grid.size))
-    survey = survey_frames(scene, T, cell.bin_scan.approach_distance_m)
+    survey = survey_frames(scene, T, approach_distance_m(cell))
     with_goals = np.flatnonzero(survey.status == Status.NOT_ATTEMPTED)
     assert len(with_goals) == 382
     connection = connect_survey(scene, survey, seed=1)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -112,10 +114,10 @@ def test_joints_beyond_the_chain_are_locked_where_the_cell_says() -> None:
 
 def test_fingers_that_mimic_follow_their_leader() -> None:
     """A mimic joint is locked at multiplier × leader + offset."""
-    finger = {"kind": "prismatic", "limit": (-1.0, 1.0), "axis": (1, 0, 0)}
+    finger = Link(kind="prismatic", limit=(-1.0, 1.0), axis=(1, 0, 0))
     mimic = '<mimic joint="joint_2" multiplier="-2" offset="0.01"/>'
     arm = robot(
-        serial_urdf([Link(), Link(**finger), Link(**finger, extra=mimic)]),
+        serial_urdf([Link(), finger, dataclasses.replace(finger, extra=mimic)]),
         "link_1",
         locked_joints_deg={"joint_2": 0.1},
     )

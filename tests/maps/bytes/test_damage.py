@@ -2,7 +2,6 @@
 
 import os
 import signal
-import subprocess
 from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
@@ -10,6 +9,7 @@ from typing import Any
 
 import h5py
 import numpy as np
+import psutil
 import pytest
 
 from reachmap.errors import MapFileError
@@ -41,14 +41,15 @@ def originals(
     """Bytes, record and reader of one file of each kind."""
     path = tmp_path_factory.mktemp("originals") / "file.h5"
     found = []
-    for record, write, read in (
+    files: list[tuple[Any, Callable[..., str], Reader]] = [
         (synthetic_workspace_map(np.full((1, 2, 2), 0.5)), write_workspace_map,
          read_workspace_map),
         (synthetic_bin_map(0.5, shape=(1, 2, 2, 2, 2)), write_bin_map, read_bin_map),
         (synthetic_placement(), write_placement, read_placement),
-    ):  # fmt: skip
-        write(path, record, overwrite=True)  # type: ignore[operator]
-        found.append((path.read_bytes(), read(path), read))  # type: ignore[operator]
+    ]  # fmt: skip
+    for record, write, read in files:
+        write(path, record, overwrite=True)
+        found.append((path.read_bytes(), read(path), read))
     return found
 
 
@@ -206,10 +207,11 @@ def test_no_image_blocks_or_crashes_this_process(
     """Not even one with a fitting seal: the copy ends, and that is all."""
     monkeypatch.setattr(isolation, "CPU_LIMIT_S", 0.5)
     before = len(list(Path("/proc/self/fd").iterdir()))
+    children = [child.pid for child in psutil.Process().children()]
     with pytest.raises(StructureError, match="HDF5 cannot read it"):
         isolation.isolated(function, b"", trusted=True)
     assert len(list(Path("/proc/self/fd").iterdir())) == before
-    assert subprocess.run(["pgrep", "-P", str(os.getpid())], check=False).returncode
+    assert [child.pid for child in psutil.Process().children()] == children
 
 
 def test_what_a_copy_finds_comes_back() -> None:

@@ -31,7 +31,7 @@ FACTS: dict[str, Any] = {
 
 def test_every_fact_changes_the_config_hash() -> None:
     """Kind, cell, seed, each setting, method and source all count."""
-    changes = [
+    changes: list[dict[str, Any]] = [
         {},
         {"kind": "workspace_map"},
         {"cell_sha256": "d" * 64},

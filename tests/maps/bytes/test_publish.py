@@ -10,6 +10,7 @@ import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -82,7 +83,7 @@ def test_a_full_disk_leaves_nothing_behind(
     path = tmp_path / "p.h5"
     path.write_bytes(b"old")
 
-    def full(*_: object) -> None:
+    def full(*_: object) -> Any:
         raise OSError(errno.ENOSPC, "No space left on device")
 
     def chunks() -> list[bytes]:
@@ -94,7 +95,7 @@ def test_a_full_disk_leaves_nothing_behind(
         monkeypatch.setattr(Path, "replace", full)
     data = (full() for _ in chunks()) if failing == "write" else chunks()
     with pytest.raises(OutputError, match="No space left on device"):
-        publish(path, data, overwrite=True)  # type: ignore[arg-type]
+        publish(path, data, overwrite=True)
     assert path.read_bytes() == b"old"
     assert names(tmp_path) == ["p.h5"]
 

@@ -88,7 +88,8 @@ def test_a_map_against_itself_has_not_changed() -> None:
     assert (r.gained, r.lost, r.change, r.p_value) == (0, 0, 0.0, 1.0)
     assert not r.squares.significant.any()
     assert r.path_length_before == r.path_length_after
-    assert r.losses == r.gains == r.cell_changes == ()
+    assert r.losses == r.gains == ()
+    assert r.cell_changes == ()
 
 
 def test_frames_are_matched_by_pose_never_by_index() -> None:
@@ -97,7 +98,7 @@ def test_frames_are_matched_by_pose_never_by_index() -> None:
     order = np.array([3, 0, 4, 2, 1])
     cubes = {
         f"other {name}": turned(cube, order)
-        for name, cube in reversed(record.cubes.items())
+        for name, cube in reversed(list(record.cubes.items()))
     }
     r = compare_maps(record, rebuilt(record, cubes))
     assert r.common == r.frames_before

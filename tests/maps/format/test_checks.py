@@ -39,7 +39,7 @@ def problems_of(record: WorkspaceMap | BinMap | BinPlacement) -> list[str]:
     return check_tree(tree_from_placement(record), PLACEMENT)
 
 
-def first(mask: np.ndarray) -> tuple[int, ...]:
+def first(mask: Any) -> tuple[int, ...]:
     """Index of the first True."""
     return tuple(int(i) for i in np.argwhere(mask)[0])
 
@@ -133,7 +133,7 @@ def test_stitched_percentages_are_those_of_the_status(kind: str) -> None:
     """Each of the three percentages is computed anew from the frames."""
     record = workspace()
     name = f"{kind}_reachability"
-    values = changed(getattr(record, name), (1, 2, 3), 12.5)
+    values: Any = changed(getattr(record, name), (1, 2, 3), 12.5)
     found = problems_of(dataclasses.replace(record, **{name: values}))
     assert found == [
         f"{name} must be what Eq. (1) gives for the status (1 of 40 do not)"

@@ -87,9 +87,7 @@ def test_workspace_maps_survive(
     chance=st.sampled_from([0.0, 0.3, 1.0]),
     seed=st.integers(0, 2**63 - 1),
 )
-def test_bin_maps_survive(
-    tmp_path: Path, shape: tuple[int, ...], chance: float, seed: int
-) -> None:
+def test_bin_maps_survive(tmp_path: Path, shape: Any, chance: float, seed: int) -> None:
     """Any number of layers, orientations, repeats; no path at all, or all of them."""
     record = synthetic_bin_map(chance, shape=shape, seed=seed)
     write_and_read(record, write_bin_map, read_bin_map, tmp_path / "b.h5")

@@ -12,6 +12,7 @@ from reachmap.maps.format.placement import PLACEMENT, tree_from_placement
 from reachmap.maps.format.store import check_tree
 from reachmap.maps.format.workspace import WORKSPACE, tree_from_workspace_map
 from reachmap.maps.records import BinMap, Status
+from tests.support.optional import present
 from tests.support.synthetic_maps import (
     synthetic_bin_map,
     synthetic_placement,
@@ -55,7 +56,7 @@ def found(r: BinMap) -> Any:
 Change = Callable[[BinMap], dict[str, Any]]
 
 
-def part(name: str, **changes: Callable[[BinMap], Any]) -> Change:
+def part(name: str, **changes: Callable[[Any], Any]) -> Change:
     """Change fields of one part of a map."""
     return lambda r: {
         name: dataclasses.replace(
@@ -142,21 +143,18 @@ def test_rules_of_the_parts_of_a_bin_map(
 @pytest.mark.parametrize("name", ["effort", "best", "margins", "cycle", "components"])
 def test_a_part_may_be_left_out(record: BinMap, name: str) -> None:
     """Without it, the rest is still sound."""
-    rest = {"paths": dataclasses.replace(record.paths, stage=None)}
-    if name != "cycle":
-        rest = {}
-    else:
-        keep = record.paths.stage == 0
-        assert keep.any()
-        rest = {"paths": without_stages(record)}
+    changes: dict[str, Any] = {name: None}
+    if name == "cycle":
+        assert (present(record.paths.stage) == 0).any()
+        changes["paths"] = without_stages(record)
     if name == "components":
-        rest["component"] = None
-    assert not problems_of(dataclasses.replace(record, **{name: None}, **rest))
+        changes["component"] = None
+    assert not problems_of(dataclasses.replace(record, **changes))
 
 
 def without_stages(record: BinMap) -> Any:
     """The paths to the grasps alone, which are the first."""
-    count = int((record.paths.stage == 0).sum())
+    count = int((present(record.paths.stage) == 0).sum())
     points = int(record.paths.row_size[:count].sum())
     return dataclasses.replace(
         record.paths,
@@ -183,16 +181,15 @@ def test_rules_of_the_other_formats() -> None:
     )
     tree = tree_from_workspace_map(workspace)
     assert not check_tree(tree, WORKSPACE)
-    reached = dataclasses.replace(
-        workspace.components, reached=np.ones_like(workspace.components.reached)
-    )
+    components = present(workspace.components)
+    reached = dataclasses.replace(components, reached=np.ones_like(components.reached))
     broken = dataclasses.replace(workspace, components=reached)
     problems = check_tree(tree_from_workspace_map(broken), WORKSPACE)
     assert any("component that is reached" in text for text in problems)
     placement = placement_with_parts(synthetic_placement())
     assert not check_tree(tree_from_placement(placement), PLACEMENT)
-    broken = dataclasses.replace(
+    unsure = dataclasses.replace(
         placement, score_error=np.full_like(placement.score, 1.0)
     )
-    problems = check_tree(tree_from_placement(broken), PLACEMENT)
+    problems = check_tree(tree_from_placement(unsure), PLACEMENT)
     assert any("score_error must be NaN" in text for text in problems)

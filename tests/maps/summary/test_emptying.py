@@ -7,6 +7,7 @@ import pytest
 
 from reachmap.maps.summary.emptying import emptying_of, volume_left
 from reachmap.plots.emptying import draw_emptying
+from tests.support.optional import present
 from tests.support.synthetic_maps import synthetic_bin_map
 
 
@@ -37,13 +38,13 @@ def test_a_part_below_one_that_cannot_be_picked_stays():
 def test_what_stays_is_named_by_its_wall():
     """Robot at +y of the bin: the low rows of y lie at the far wall."""
     reached = np.ones((3, 6, 8), bool)
-    found = emptying_of(a_map(reached))
+    found = present(emptying_of(a_map(reached)))
     assert found.left == 0
     assert found.sentence == "empties to 50 mm, the lowest level, everywhere"
     for rows, wall in ((0, "far"), (-1, "near")):
         reached = np.ones((3, 6, 8), bool)
         reached[0, rows] = False
-        found = emptying_of(a_map(reached))
+        found = present(emptying_of(a_map(reached)))
         # One row of six, the lower half of its depth.
         assert found.left == pytest.approx(100 / 6 * 0.5)
         assert found.empties_to_m == pytest.approx(0.1)
@@ -58,19 +59,19 @@ def test_what_stays_is_named_by_its_wall():
         )
     reached = np.ones((3, 6, 8), bool)
     reached[0, :, 0] = reached[0, :, -1] = False
-    assert emptying_of(a_map(reached)).where == "along the +x and -x walls"
+    assert present(emptying_of(a_map(reached))).where == "along the +x and -x walls"
     reached = np.ones((3, 6, 8), bool)
     reached[:, 1:-1, 1:-1] = True
     reached[0, 0], reached[0, -1], reached[0, :, 0], reached[0, :, -1] = (False,) * 4
-    assert emptying_of(a_map(reached)).where == "around the walls"
-    assert emptying_of(a_map(np.zeros((3, 6, 8), bool))).left == 100
+    assert present(emptying_of(a_map(reached))).where == "around the walls"
+    assert present(emptying_of(a_map(np.zeros((3, 6, 8), bool)))).left == 100
 
 
 def test_a_full_bin_that_cannot_be_picked_everywhere_says_so():
     """There is no height that it empties to."""
     reached = np.ones((2, 4, 4), bool)
     reached[1, 0, 0] = False
-    found = emptying_of(a_map(reached))
+    found = present(emptying_of(a_map(reached)))
     assert found.empties_to_m is None
     assert found.left == pytest.approx(100 / 16)
     assert found.sentence.startswith("no level can be picked everywhere; the last 6 %")
@@ -84,7 +85,7 @@ def test_a_single_layer_has_no_curve_and_several_have_a_picture():
     reached = np.ones((3, 6, 8), bool)
     reached[0, 0] = False
     record = a_map(reached)
-    figure = draw_emptying(record, emptying_of(record))
+    figure = draw_emptying(record, present(emptying_of(record)))
     axes = figure.axes[0]
     lines = {line.get_label(): line for line in axes.lines}
     line = lines["points, from at least one direction"]

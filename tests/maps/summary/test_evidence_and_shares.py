@@ -16,6 +16,7 @@ from reachmap.maps.summary.directions import (
 from reachmap.maps.summary.evidence import evidence_of
 from reachmap.maps.summary.reliability import reliability_of, term_reliability
 from reachmap.maps.summary.statistics import are_independent
+from tests.support.optional import present
 from tests.support.ranking_maps import make_bin_map
 from tests.support.synthetic_parts import synthetic_components
 
@@ -103,7 +104,7 @@ def test_the_terms_of_a_map_count_successes_alone() -> None:
     """Checks of attempts that failed do not count."""
     record = make_bin_map(seed=2)
     shares = term_reliability(record)
-    checks = np.where(record.path_found == 1, record.effort.checks, np.nan)
+    checks = np.where(record.path_found == 1, present(record.effort).checks, np.nan)
     again = reliability_of(checks.reshape(-1, checks.shape[-1]))
     assert shares["effort_checks"] == again
     shared = dataclasses.replace(
