@@ -20,6 +20,7 @@ from reachmap.maps.records import BinMap
 from reachmap.sampling.frames import bin_test_frames
 from reachmap.tools.bin_scan import bin_scan
 from reachmap.tools.check import check
+from tests.support.optional import present
 
 CORNERS = ("0 0 0", "0.05 0 0", "0 0.05 0", "0 0 0.05")
 STL = "solid a\n"
@@ -470,7 +471,7 @@ def test_four_axes_pick_at_the_roll_they_have(tmp_path: Path) -> None:
     for grasp in hit:
         row, j, i, _ = grasp
         p = scene.T_base_bin @ [x[i], y[j], layer[row], 1.0]
-        q = found.paths.configuration[ends[found.best.row[tuple(grasp)]] - 1]
+        q = found.paths.configuration[ends[present(found.best).row[tuple(grasp)]] - 1]
         T = scene.kinematics.forward(q)
         np.testing.assert_allclose(T[:3, 3], p[:3], atol=1e-6)
         np.testing.assert_allclose(T[:3, 2], [0, 0, -1], atol=1e-6)

@@ -11,6 +11,7 @@ from reachmap.errors import SettingsError
 from reachmap.maps.records import BinMap
 from reachmap.ranking import Ranker
 from reachmap.ranking.lookup.settings import MARGINS
+from tests.support.optional import present
 from tests.support.ranking_maps import make_bin_map
 from tests.support.synthetic_maps import synthetic_bin_map
 from tests.support.synthetic_parts import bin_with_parts
@@ -25,7 +26,7 @@ def with_margins() -> BinMap:
 
 def on_test_points(bin_map: BinMap) -> tuple[np.ndarray, np.ndarray]:
     """Points and quaternions of the test grasps that are reached."""
-    reached = np.argwhere(bin_map.best.row >= 0)
+    reached = np.argwhere(present(bin_map.best).row >= 0)
     points = bin_map.position[tuple(reached[:, :3].T)]
     return points, bin_map.quaternion_wxyz[tuple(reached.T)]
 
@@ -42,15 +43,16 @@ def test_a_margin_orders_grasps_as_the_values_in_the_map_do(name):
         margins={name: 2.0},
         roll="fixed",
     )
-    reached = bin_map.best.row >= 0
+    reached = present(bin_map.best).row >= 0
     if name == "wind_up":
         values = wound_by_hand(bin_map)[reached]
         expected = values / np.quantile(values, 0.95)
     else:
+        margins = present(bin_map.margins)
         stored = {
-            "clearance": bin_map.margins.clearance,
-            "joint_margin": bin_map.margins.joint_margin,
-            "singularity": bin_map.margins.smallest_singular_value,
+            "clearance": margins.clearance,
+            "joint_margin": margins.joint_margin,
+            "singularity": margins.smallest_singular_value,
         }[name]
         values = stored[reached]
         expected = np.maximum(1 - values / np.quantile(values, 0.95), 0)
@@ -60,11 +62,12 @@ def test_a_margin_orders_grasps_as_the_values_in_the_map_do(name):
 
 def wound_by_hand(bin_map: BinMap) -> np.ndarray:
     """Furthest turn of the last joint on the best path and the stages, in loops."""
-    wound = np.full(bin_map.best.row.shape, np.nan)
+    best, stage = present(bin_map.best).row, present(bin_map.paths.stage)
+    wound = np.full(best.shape, np.nan)
     start = np.concatenate([[0], np.cumsum(bin_map.paths.row_size)])
     for k, index in enumerate(bin_map.paths.index.tolist()):
         place = tuple(index[:4])
-        if bin_map.paths.stage[k] == 0 and bin_map.best.row[place] != k:
+        if stage[k] == 0 and best[place] != k:
             continue
         path = bin_map.paths.configuration[start[k] : start[k + 1], -1]
         turned = float(np.abs(path - bin_map.scan_configuration[-1]).max())
@@ -91,7 +94,7 @@ def test_a_pair_that_is_never_checked_costs_nothing():
     """Where no pair of bodies is checked, clearance is unknown, and no reproach."""
     bin_map = with_margins()
     margins = dataclasses.replace(
-        bin_map.margins, clearance=np.full(bin_map.status.shape, np.nan)
+        present(bin_map.margins), clearance=np.full(bin_map.status.shape, np.nan)
     )
     ranker = Ranker(dataclasses.replace(bin_map, margins=margins))
     points, quaternions = on_test_points(bin_map)
