@@ -272,3 +272,24 @@ def test_killed_while_publishing(tmp_path, moment):
     assert seen >= 1
     assert list(tmp_path.iterdir()) == [output]
     assert json.loads(output.read_text()) == expected()
+
+
+@pytest.mark.parametrize(
+    "moment",
+    ["os.link:1", "pathlib.Path.unlink:1", *(f"os.fsync:{k}" for k in range(1, 5))],
+)
+def test_a_foreign_file_after_a_kill_is_no_licence_to_replace_it(tmp_path, moment):
+    """Whatever moment of publishing it was: only the very file may be replaced."""
+    output = tmp_path / "out.json"
+    process = start(output, "-j", "1", more={"TOY_DIES_AT": moment})
+    process.communicate(timeout=60)
+    assert process.returncode == -signal.SIGKILL
+    output.unlink(missing_ok=True)
+    output.write_text("precious")
+    code, _, err = finish(output, "-j", "1")
+    assert (code, output.read_text()) == (2, "precious")
+    assert "--overwrite" in err
+    output.unlink()
+    assert finish(output, "-j", "1")[0] == 0
+    assert json.loads(output.read_text()) == expected()
+    assert list(tmp_path.iterdir()) == [output]

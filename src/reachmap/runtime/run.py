@@ -16,12 +16,14 @@ import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, closing, contextmanager, nullcontext
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from reachmap.disk import is_there
 from reachmap.errors import EngineError, IncompleteError, NoRoomError, OutputError
 from reachmap.maps import RunClock, RunInfo, check_output
+from reachmap.maps.bytes.publish import Identity, announced, identity
 from reachmap.runtime.encoding import decode, encode
 from reachmap.runtime.executors import open_pool
 from reachmap.runtime.job import Job, Measure, Reply, Work, engine_versions, one_frame
@@ -342,12 +344,12 @@ def _compute_missing(work: Work, run: _Run) -> None:
 def _publish(
     work: Work, artefact: Any, output: Path, store: Store, options: RunOptions
 ) -> None:
-    """Put an artefact in place; the store knows about it before and after."""
+    """Put an artefact in place; the store knows it from before the move on."""
     overwrite = options.overwrite or _is_own(store, output)
     try:
-        _note(store, {"replaces": _identity(output)})
-        work.kind.write(output, artefact, overwrite=overwrite)
-        _note(store, {"is": _identity(output)})
+        with announced(partial(_note, store)):
+            work.kind.write(output, artefact, overwrite=overwrite)
+        _note(store, identity(output))
     except OutputError as error:
         lines = [*error.lines, f"{store.safe_text()}; the same command goes on"]
         if isinstance(error, NoRoomError):
@@ -355,29 +357,18 @@ def _publish(
         raise OutputError(lines) from error
 
 
-def _note(store: Store, note: Mapping[str, Any]) -> None:
+def _note(store: Store, published: Identity | None) -> None:
+    """Remember a file as one of this work's, before it is in its place and after."""
     number = len(store.results(PUBLISHED))
-    store.put(Reply(index=number, text=encode(note)), PUBLISHED)
+    store.put(Reply(index=number, text=encode({"is": published})), PUBLISHED)
     store.sync()
 
 
 def _is_own(store: Store, output: Path) -> bool:
     """Whether what stands in the place of the output was put there by this work."""
-    notes = store.results(PUBLISHED)
-    if not notes:
-        return False
-    note = store.payload(max(notes), PUBLISHED)
-    if "is" in note:
-        return bool(note["is"] == _identity(output))
-    # Killed while publishing: what is there now is new, or is not.
-    return bool(note.get("replaces") != _identity(output))
-
-
-def _identity(path: Path) -> list[int] | None:
-    if not is_there(path):
-        return None
-    found = path.stat()
-    return [found.st_ino, found.st_size, found.st_mtime_ns]
+    found = identity(output)
+    notes = (store.payload(number, PUBLISHED) for number in store.results(PUBLISHED))
+    return found is not None and any(note.get("is") == found for note in notes)
 
 
 def _unit_failed(index: int, text: str) -> EngineError:

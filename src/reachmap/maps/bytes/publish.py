@@ -7,7 +7,8 @@ import errno
 import fcntl
 import os
 import stat
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextvars import ContextVar
 from pathlib import Path
 
 from reachmap.disk import is_text, is_there, real_path
@@ -18,6 +19,10 @@ SUFFIX_BYTES = 24
 
 NO_ROOM = frozenset({errno.ENOSPC, errno.EFBIG, errno.EDQUOT})
 PICTURES = (".png", ".svg")
+Identity = list[int]
+_ANNOUNCE: ContextVar[Callable[[Identity | None], None] | None] = ContextVar(
+    "announce", default=None
+)
 EXISTS = "exists already; --overwrite replaces it, --output names another file"
 
 
@@ -178,6 +183,8 @@ def publish(path: Path, chunks: Iterable[bytes], *, overwrite: bool = False) -> 
                 for chunk in chunks:
                     stream.write(chunk)
             os.fsync(descriptor)
+            if (announce := _ANNOUNCE.get()) is not None:
+                announce(identity(temporary))
             if overwrite:
                 temporary.replace(target)
             else:
@@ -191,6 +198,31 @@ def publish(path: Path, chunks: Iterable[bytes], *, overwrite: bool = False) -> 
         kind = NoRoomError if error.errno in NO_ROOM else OutputError
         raise kind(f"{path}: cannot be written ({_reason(error)})") from error
     return target
+
+
+@contextlib.contextmanager
+def announced(announce: Callable[[Identity | None], None]) -> Iterator[None]:
+    """Have the files that are published in a block announced before they are moved.
+
+    Parameters
+    ----------
+    announce : callable
+        Gets the identity that a file, complete under its temporary name, will have in
+        its place, too.
+    """
+    token = _ANNOUNCE.set(announce)
+    try:
+        yield
+    finally:
+        _ANNOUNCE.reset(token)
+
+
+def identity(path: Path) -> Identity | None:
+    """What tells a file from another in its place; None where there is none."""
+    if not is_there(path):
+        return None
+    found = path.stat()
+    return [found.st_ino, found.st_size, found.st_mtime_ns]
 
 
 @contextlib.contextmanager
