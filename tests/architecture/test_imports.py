@@ -42,6 +42,7 @@ HOMES = {
     "h5py": ("reachmap.maps.bytes.",),
     "matplotlib": ("reachmap.plots.",),
     "click": ("reachmap.cli",),
+    "toppra": ("reachmap.core.planning.time_laws.optimal",),
     "viser": ("reachmap.view.",),
     "trimesh": ("reachmap.view.",),
     "xacro": ("reachmap.cell.",),

@@ -18,6 +18,7 @@ from reachmap.core.collision.checker import CollisionChecker
 from reachmap.core.kinematics.kinematics import Kinematics
 from reachmap.core.planning.motion import MotionChecker
 from reachmap.core.planning.planner import Planner
+from reachmap.core.planning.time_laws.law import TimeLaw
 from reachmap.core.robot.model import RobotModel
 from reachmap.errors import SceneError
 
@@ -40,6 +41,7 @@ class Scene:
     checker : CollisionChecker
     motions : MotionChecker
     planner : Planner
+    time_law : TimeLaw
     scan_configuration : array, shape (dof,)
         [rad].
     T_base_bin : array, shape (4, 4)
@@ -53,6 +55,7 @@ class Scene:
     checker: CollisionChecker
     motions: MotionChecker
     planner: Planner
+    time_law: TimeLaw
     scan_configuration: FloatArray
     T_base_bin: FloatArray
     with_bin: bool
@@ -101,6 +104,7 @@ class Scene:
             checker=checker,
             motions=motions,
             planner=Planner(motions, cell.planner),
+            time_law=TimeLaw(name=cell.planner.time_law, robot=robot, motions=motions),
             scan_configuration=robot.configuration(
                 loaded.scan_configuration_rad, "scan_configuration"
             ),

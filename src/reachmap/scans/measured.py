@@ -8,12 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from reachmap._typing import FloatArray
-from reachmap.core.planning.timing import (
-    execution_time_s,
-    path_length_rad,
-    polyline_length_m,
-    smooth_way_time_s,
-)
+from reachmap.core.planning.timing import path_length_rad, polyline_length_m
 
 if TYPE_CHECKING:
     from reachmap.core.planning.planner import PlanResult
@@ -80,15 +75,13 @@ class Meter:
         ]
 
     def _numbers(self, path: FloatArray, way: FloatArray) -> _MotionNumbers:
-        robot = self._scene.robot
-        limits = (robot.velocity_rad_s, robot.acceleration_rad_s2)
         whole = np.vstack([path, way[1:]])
         approach_s = self._approach_time_s(way)
         return _MotionNumbers(
             path_length_rad=path_length_rad(whole),
             planned_length_rad=path_length_rad(path),
             tcp_length_m=polyline_length_m(self._scene.tcp_path_points(whole)),
-            execution_time_s=execution_time_s(path, *limits) + approach_s,
+            execution_time_s=self._scene.time_law.path_time_s(path) + approach_s,
             approach_time_s=approach_s,
         )
 
@@ -96,9 +89,7 @@ class Meter:
         """Time of an approach, which many paths share."""
         key = way.tobytes()
         if key not in self._approaches:
-            robot = self._scene.robot
-            limits = (robot.velocity_rad_s, robot.acceleration_rad_s2)
-            self._approaches[key] = smooth_way_time_s(way, *limits)
+            self._approaches[key] = self._scene.time_law.way_time_s(way)
         return self._approaches[key]
 
 

@@ -16,7 +16,11 @@ from reachmap.cell.text.yaml_reader import Document, parse_yaml
 from reachmap.errors import CellError
 
 MoveItLimits = dict[str, float | bool]
-_RATES = (("velocity_rad_s", "velocity"), ("acceleration_rad_s2", "acceleration"))
+_RATES = (
+    ("velocity_rad_s", "velocity"),
+    ("acceleration_rad_s2", "acceleration"),
+    ("jerk_rad_s3", "jerk"),
+)
 _LARGEST = 1e6
 _TAGS = {"!degrees": math.radians, "!radians": float}
 # As yaml-cpp and rospy read them; YAML 1.2 knows only true and false.
@@ -33,7 +37,8 @@ class MoveItFile:
     ----------
     joints : dict
         Joint name to its ``has_*_limits`` and ``max_*``/``min_*`` entries, with
-        only the limits that are switched on [rad/s, rad/s², rad; m for prismatic].
+        only the limits that are switched on [rad, rad/s, rad/s², rad/s³; m for a
+        prismatic joint].
     notes : tuple of str
         What is not used, in words.
     """
@@ -93,6 +98,7 @@ def _one(document: Document, name: str, entry: Any) -> MoveItLimits:
     for kind, keys in (
         ("velocity", ("max_velocity",)),
         ("acceleration", ("max_acceleration",)),
+        ("jerk", ("max_jerk",)),
         ("position", ("min_position", "max_position")),
     ):
         flag = f"has_{kind}_limits"
@@ -147,7 +153,7 @@ def tighten_limits(
             for joint in moving
             if f"max_{kind}" in table.get(joint, {})
         }
-        given = limits[key]
+        given = limits.get(key)
         if found and isinstance(given, float):
             given = dict.fromkeys(moving, given)
         for joint, value in found.items():

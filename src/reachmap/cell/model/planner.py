@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import ClassVar, Literal
 
 from pydantic import Field
 
-from reachmap.cell.model.fields import NonNegative, Positive, Record
+from reachmap.cell.model.fields import GrowingRecord, NonNegative, Positive, Record
 
 # PRM and PRMstar are left out: they search in a second thread, which waits for ever
 # for the interpreter that the checks in the first one hold.
@@ -14,6 +14,8 @@ PlannerName = Literal[
     "LBKPIECE1", "BKPIECE1", "KPIECE1", "RRTConnect", "RRT", "RRTstar",
     "InformedRRTstar", "SORRTstar", "BITstar", "FMT", "BFMT", "AORRTC",
 ]  # fmt: skip
+
+TimeLawName = Literal["trapezoid", "jerk", "blend", "toppra"]
 
 
 class SimplificationSpec(Record):
@@ -29,8 +31,10 @@ class SimplificationSpec(Record):
     )
 
 
-class PlannerSpec(Record):
-    """The planner, its budget in state checks, and its safety net in seconds."""
+class PlannerSpec(GrowingRecord):
+    """The planner, its budget in state checks, and how its paths are timed."""
+
+    later: ClassVar[tuple[str, ...]] = ("time_law",)
 
     name: PlannerName = Field("LBKPIECE1", description="OMPL geometric planner.")
     range_rad: Positive | None = Field(
@@ -63,4 +67,10 @@ class PlannerSpec(Record):
     )
     simplification: SimplificationSpec = Field(
         SimplificationSpec(), description="How a found path is shortened."
+    )
+    time_law: TimeLawName = Field(
+        "trapezoid",
+        description="How motions are timed. trapezoid: at rest at every corner; jerk: "
+        "the same with `robot.limits.jerk_rad_s3`; blend: corners blended as far as "
+        "the blend is verified; toppra: the time optimum along those blends.",
     )

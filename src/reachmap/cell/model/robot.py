@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import BeforeValidator, Field, WithJsonSchema
 
 from reachmap.cell.model.fields import (
     Finite,
+    GrowingRecord,
     Interval,
     Name,
     PoseSpec,
@@ -35,17 +36,24 @@ class TcpSpec(PoseSpec):
     approach_axis: SignedAxis = Field("+z", description="TCP axis into the object.")
 
 
-class JointLimits(Record):
+class JointLimits(GrowingRecord):
     """Limits that the URDF lacks or that the cell tightens.
 
     One number holds for all joints; a mapping names joints.
     """
+
+    later: ClassVar[tuple[str, ...]] = ("jerk_rad_s3",)
 
     velocity_rad_s: Rates | None = Field(
         None, description="Highest velocity [rad/s; m/s for a prismatic joint]."
     )
     acceleration_rad_s2: Rates | None = Field(
         None, description="Highest acceleration [rad/s²; m/s² for a prismatic joint]."
+    )
+    jerk_rad_s3: Rates | None = Field(
+        None,
+        description="Highest jerk [rad/s³; m/s³ for a prismatic joint]; needed where "
+        "`planner.time_law` is jerk.",
     )
     position_deg: dict[str, Interval] = Field(
         default_factory=dict,
@@ -54,7 +62,7 @@ class JointLimits(Record):
     scaling: Annotated[float, Field(gt=0, le=1)] = Field(
         1.0,
         description="Motions take 1/scaling times as long: factor on velocities, its "
-        "square on accelerations.",
+        "square on accelerations, its cube on jerks.",
     )
 
 

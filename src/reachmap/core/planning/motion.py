@@ -86,6 +86,35 @@ class MotionChecker:
                 pending.append((share + half_share, half_share, reach_m))
         return True
 
+    def parabola_is_verified(
+        self, begin: FloatArray, corner: FloatArray, end: FloatArray
+    ) -> bool:
+        """Check the parabola that touches two straight motions, as densely as those.
+
+        Parameters
+        ----------
+        begin, corner, end : array, shape (dof,)
+            Its control points: a quadratic Bézier curve.
+        """
+        checker, finest_m = self.checker, self.verification_distance_m / 2
+        pending = deque([(begin, corner, end)])
+        while pending:
+            a, b, c = pending.popleft()
+            left, right = (a + b) / 2, (b + c) / 2
+            middle = (left + right) / 2
+            # A piece lies in the triangle of its control points, and how far a point
+            # moves at most is convex in where the joints are.
+            reach_m = max(
+                float(np.abs(x - middle) @ checker.reach_m) for x in (a, b, c)
+            )
+            if finest_m < reach_m <= WIDEST_M and checker.is_clear(middle, reach_m):
+                continue
+            if not checker.is_free(middle):
+                return False
+            if reach_m > finest_m:
+                pending += [(a, left, middle), (middle, right, c)]
+        return True
+
     def _pieces(self, q_from: FloatArray, change: FloatArray) -> deque[_Piece]:
         """Pieces that cover a motion: middle, half width (as shares), displacement."""
         checker = self.checker

@@ -29,12 +29,15 @@ class LimitTable:
         Speeds [rad/s], times the cell's scaling.
     acceleration : array, shape (dof,)
         Accelerations [rad/s²], times the square of the cell's scaling.
+    jerk : array, shape (dof,)
+        Jerks [rad/s³], times the cube of the scaling; infinite where none is given.
     """
 
     lower: FloatArray
     upper: FloatArray
     velocity: FloatArray
     acceleration: FloatArray
+    jerk: FloatArray
 
 
 def merge_limits(joints: Sequence[UrdfJoint], cell: JointLimits) -> LimitTable:
@@ -66,13 +69,19 @@ def merge_limits(joints: Sequence[UrdfJoint], cell: JointLimits) -> LimitTable:
         # A motion takes 1/scaling times as long, whichever of the two limits it,
         # if accelerations go with the square; so do the speed sliders of controllers.
         acceleration=acceleration * cell.scaling**2,
+        jerk=_jerks(joints, cell.jerk_rad_s3) * cell.scaling**3,
     )
 
 
 def _unknown_names(joints: Sequence[UrdfJoint], cell: JointLimits) -> list[str]:
     names = [j.name for j in joints]
     problems = []
-    for field in ("position_deg", "velocity_rad_s", "acceleration_rad_s2"):
+    for field in (
+        "position_deg",
+        "velocity_rad_s",
+        "acceleration_rad_s2",
+        "jerk_rad_s3",
+    ):
         given = getattr(cell, field)
         unknown = sorted(set(given) - set(names)) if isinstance(given, dict) else []
         problems += [
@@ -111,6 +120,14 @@ def _position(
             f"(lower {low:.6g}, upper {high:.6g} {unit})"
         )
     return low, high
+
+
+def _jerks(
+    joints: Sequence[UrdfJoint], given: float | Mapping[str, float] | None
+) -> FloatArray:
+    if isinstance(given, Mapping):
+        return np.array([given.get(joint.name, math.inf) for joint in joints])
+    return np.full(len(joints), math.inf if given is None else given)
 
 
 def _rates(

@@ -54,8 +54,8 @@ class RobotModel:
     is_revolute : array of bool, shape (dof,)
     lower_rad, upper_rad : array, shape (dof,)
         Position limits [rad] ([m] for prismatic joints).
-    velocity_rad_s, acceleration_rad_s2 : array, shape (dof,)
-        With the cell's scaling.
+    velocity_rad_s, acceleration_rad_s2, jerk_rad_s3 : array, shape (dof,)
+        With the cell's scaling; a jerk that nothing limits is infinite.
     base_frame : str
         URDF frame called ``robot_base``.
     ik : IkSpec
@@ -82,6 +82,7 @@ class RobotModel:
     upper_rad: FloatArray
     velocity_rad_s: FloatArray
     acceleration_rad_s2: FloatArray
+    jerk_rad_s3: FloatArray
     base_frame: str
     ik: IkSpec
     T_root_base: FloatArray
@@ -159,6 +160,7 @@ class RobotModel:
             upper_rad=limits.upper,
             velocity_rad_s=limits.velocity,
             acceleration_rad_s2=limits.acceleration,
+            jerk_rad_s3=limits.jerk,
             base_frame=chain.base,
             ik=spec.ik,
             T_root_base=np.array(root_base.homogeneous),

@@ -1,0 +1,1 @@
+"""Laws by which motions are timed, from exact stops to the optimum."""
