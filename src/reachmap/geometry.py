@@ -46,6 +46,12 @@ def transform_from_parts(R: npt.ArrayLike, p: npt.ArrayLike) -> FloatArray:
     return T
 
 
+def axis_vector(axis: str) -> FloatArray:
+    """Unit vector of a signed axis, as in ``"-z"``, shape (3,)."""
+    column, sign = AXES[axis]
+    return np.asarray(sign * np.eye(3)[column])
+
+
 def inverse_transform(T: FloatArray) -> FloatArray:
     """Invert rigid transforms, shape (..., 4, 4)."""
     R_t = np.swapaxes(T[..., :3, :3], -1, -2)

@@ -13,7 +13,7 @@ import numpy as np
 from reachmap._typing import FloatArray
 from reachmap.cell.model.tool import FREE
 from reachmap.core.collision.bin_fit import BinFit
-from reachmap.core.collision.bodies import bin_placements, build_geometry
+from reachmap.core.collision.bodies import Load, bin_placements, build_geometry
 from reachmap.core.collision.checker import CollisionChecker
 from reachmap.core.kinematics.kinematics import Kinematics
 from reachmap.core.planning.motion import MotionChecker
@@ -47,6 +47,8 @@ class Scene:
     T_base_bin : array, shape (4, 4)
     with_bin : bool
         Whether the bin is among the obstacles.
+    load : Load
+        What hangs on the tool.
     """
 
     loaded: LoadedCell = field(repr=False)
@@ -59,6 +61,7 @@ class Scene:
     scan_configuration: FloatArray
     T_base_bin: FloatArray
     with_bin: bool
+    load: Load = "empty"
 
     @classmethod
     def build(
@@ -113,13 +116,16 @@ class Scene:
         )
 
     @classmethod
-    def shared(cls, loaded: LoadedCell, *, with_bin: bool = True) -> Scene:
+    def shared(
+        cls, loaded: LoadedCell, *, with_bin: bool = True, load: Load = "empty"
+    ) -> Scene:
         """Scene of a cell, built once per process as long as the cell is the same.
 
         Parameters
         ----------
         loaded : LoadedCell
         with_bin : bool
+        load : Load
 
         Raises
         ------
@@ -127,11 +133,36 @@ class Scene:
             As :meth:`build` raises it.
         """
         for scene in _shared:
-            if scene.with_bin == with_bin and scene.loaded == loaded:
+            if (scene.with_bin, scene.load) == (with_bin, load) and (
+                scene.loaded == loaded
+            ):
                 return scene
-        scene = cls.build(loaded, with_bin=with_bin)
+        if load == "empty":
+            scene = cls.build(loaded, with_bin=with_bin)
+        else:
+            scene = cls.shared(loaded, with_bin=with_bin).with_load(load)
         _shared.appendleft(scene)
         return scene
+
+    def with_load(self, load: Load) -> Scene:
+        """The same scene with something else on the tool."""
+        cell = self.loaded.cell
+        bodies = build_geometry(
+            self.robot, self.loaded, with_bin=self.with_bin, load=load
+        )
+        checker = CollisionChecker(self.robot, bodies, cell.collision.safety_margin_m)
+        motions = MotionChecker(
+            checker,
+            cell.collision.planning_step_rad,
+            cell.collision.verification_distance_m,
+        )
+        return dataclasses.replace(
+            self,
+            checker=checker,
+            motions=motions,
+            planner=Planner(motions, cell.planner),
+            load=load,
+        )
 
     def with_bin_of(self, loaded: LoadedCell) -> Scene:
         """Move the bin to where a version of the cell has it.
@@ -203,4 +234,5 @@ class Scene:
         return self.kinematics.forward_many(np.vstack(pieces))[:, :3, 3]
 
 
-_shared: deque[Scene] = deque(maxlen=2)
+# The cell as it is, with and without the bin, and with the part on the tool.
+_shared: deque[Scene] = deque(maxlen=6)

@@ -22,8 +22,12 @@ from reachmap.maps.parts import (
 )
 from reachmap.maps.records import NO_PAIR, freeze
 from reachmap.sampling.frames import approach_distance_m, bin_test_frames
+from reachmap.scans.cycle.results import CycleResults
 from reachmap.scans.document import provenance_from_document
 from reachmap.scans.measured import MEASURED, SECONDS_PER_CHECK
+
+NO_PATH = -2
+"""In place of a repeat, where there is no path."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -51,7 +55,14 @@ class GraspResults:
         Way-points of all paths, one path after another.
     row_size, planned_size : int array, shape (paths,)
     place : int array, shape (paths, 2)
-        Grasp and repeat of each path; repeat -1 for the roadmap's own.
+        Grasp and repeat of each path; repeat -1 for the roadmap's own, and for stages
+        of the cycle.
+    stage : uint8 array, shape (paths,)
+        0: to the grasp; then the stages of the cycle.
+    best_repeat : int array, shape (grasps,)
+        Repeat of the path that a line would run, :data:`NO_PATH` without one.
+    cycle : CycleResults or None
+        None where the cell has no part.
     """
 
     status: CodeArray
@@ -71,12 +82,17 @@ class GraspResults:
     row_size: IntArray
     planned_size: IntArray
     place: IntArray
+    stage: CodeArray
+    best_repeat: IntArray
+    cycle: CycleResults | None = None
 
     def __post_init__(self) -> None:
         freeze(self)
 
     @classmethod
-    def blank(cls, grasps: int, repeats: int, dof: int, status: Status) -> GraspResults:
+    def blank(
+        cls, grasps: int, repeats: int, dof: int, status: Status, *, stages: int = 0
+    ) -> GraspResults:
         """Results of grasps that nothing is known of."""
         return cls(
             status=np.full(grasps, status, np.uint8),
@@ -96,6 +112,9 @@ class GraspResults:
             row_size=np.zeros(0, np.int64),
             planned_size=np.zeros(0, np.int64),
             place=np.zeros((0, 2), np.int64),
+            stage=np.zeros(0, np.uint8),
+            best_repeat=np.full(grasps, NO_PATH, np.int64),
+            cycle=CycleResults.blank(grasps, stages) if stages else None,
         )
 
     def renumbered(self, pair: IntArray, first_component: int) -> GraspResults:
@@ -126,14 +145,19 @@ class GraspResults:
         joined = {
             name: np.concatenate([getattr(part, name) for part in parts])
             for name in cls.__slots__
-            if name != "place"
+            if name not in ("place", "cycle")
         }
         begin = np.cumsum([0, *(len(part.status) for part in parts[:-1])])
         place = [
             part.place + np.array([first, 0])
             for part, first in zip(parts, begin, strict=True)
         ]
-        return cls(**joined, place=np.concatenate(place))
+        cycles = [part.cycle for part in parts if part.cycle is not None]
+        return cls(
+            **joined,
+            place=np.concatenate(place),
+            cycle=CycleResults.join(cycles) if cycles else None,
+        )
 
 
 def assemble_bin_map(
@@ -167,13 +191,9 @@ def assemble_bin_map(
     known = (results.status != Status.NOT_ATTEMPTED).reshape(shape)
     with np.errstate(invalid="ignore"):
         percent = 100.0 * found.sum(-1) / known.sum(-1)
+    cycle = results.cycle
     quaternion = np.broadcast_to(grid.frames.quaternion_wxyz, (*shape, 4))
     best = _best_paths(results)
-    goal = np.full((len(results.status), results.configuration.shape[1]), np.nan)
-    there = best.row >= 0
-    goal[there] = results.configuration[
-        np.cumsum(results.row_size)[best.row[there]] - 1
-    ]
     return BinMap(
         T_world_base=cell.robot.base_pose.matrix(),
         layer=grid.layer,
@@ -203,6 +223,9 @@ def assemble_bin_map(
             None if cell.tool.roll == LISTED else shaped(results.winning_roll)
         ),
         margins=_margins(shaped(results.margins)),
+        cycle=None
+        if cycle is None
+        else cycle.section(document["stages"], known, shaped),
         path_reachability=percent,
         scan_configuration=np.array(document["scan_configuration"], float),
         joint_names=tuple(document["joint_names"]),
@@ -243,7 +266,7 @@ def _margins(values: FloatArray) -> Margins:
 
 
 def _best_paths(results: GraspResults) -> BestPaths:
-    """The shortest path to each test grasp, of whatever origin; the first of equals."""
+    """The path to each test grasp that a line would run."""
     grasps = len(results.status)
     row = np.full(grasps, -1, np.int64)
     execution = np.full(grasps, np.nan)
@@ -251,11 +274,10 @@ def _best_paths(results: GraspResults) -> BestPaths:
     effort = np.zeros(grasps, np.int64)
     ends = np.cumsum(results.row_size)
     for k, (grasp, repeat) in enumerate(results.place.tolist()):
-        path = results.configuration[ends[k] - results.row_size[k] : ends[k]]
-        length_rad = path_length_rad(path)
-        if length_rad >= length[grasp]:
+        if results.stage[k] or repeat != results.best_repeat[grasp]:
             continue
-        row[grasp], length[grasp] = k, length_rad
+        path = results.configuration[ends[k] - results.row_size[k] : ends[k]]
+        row[grasp], length[grasp] = k, path_length_rad(path)
         own = repeat < 0
         numbers = results.own[grasp] if own else results.measured[grasp, repeat]
         execution[grasp] = numbers[MEASURED.index("execution_time")]
@@ -281,4 +303,5 @@ def _path_store(results: GraspResults, shape: tuple[int, ...]) -> PathStore:
         row_size=results.row_size,
         planned_size=results.planned_size,
         index=np.concatenate([where, results.place[:, 1:]], axis=1).astype(np.int64),
+        stage=None if results.cycle is None else results.stage,
     )

@@ -12,8 +12,6 @@ import numpy as np
 
 from reachmap._typing import FloatArray, IntArray
 from reachmap.cell.model.tool import LISTED
-from reachmap.core.planning.roadmap import ShortestPaths
-from reachmap.core.planning.routes import RouteNetwork
 from reachmap.core.scene import Scene
 from reachmap.maps.parts import Components
 from reachmap.runtime.job import Stages
@@ -120,28 +118,20 @@ def _connection(scene: Scene, survey: Survey, progress: Progress) -> dict[str, A
     routes = Routes.of(
         scene, survey, connection, with_network=cell.bin_scan.attempts == "roadmap"
     )
-    network = routes.network
     return {
         "component": component_of_frames(survey, connection),
         "components": dataclasses.asdict(components_of(connection)),
-        "paths": dataclasses.asdict(routes.paths),
-        "node": routes.node,
-        "network": None if network is None else dataclasses.asdict(network),
+        **routes.payload(),
     }
 
 
 def _roadmap_from_payload(survey: Survey, payload: Mapping[str, Any]) -> BinRoadmap:
     """What a stage of the scan has left in the store."""
-    network = payload["network"]
     return BinRoadmap(
         survey=survey,
         component=payload["component"],
         components=components_from_payload(payload["components"]),
-        routes=Routes(
-            paths=ShortestPaths(**payload["paths"]),
-            node=payload["node"],
-            network=None if network is None else RouteNetwork(**network),
-        ),
+        routes=Routes.from_payload(payload),
     )
 
 

@@ -20,7 +20,7 @@ from reachmap.maps import BinMap, RunInfo, Status, write_bin_map
 from reachmap.maps.parts import Components
 from reachmap.runtime.job import Job, Kind, Stages, Work, blocks, one_frame
 from reachmap.runtime.progress import Progress
-from reachmap.scans.bin_results import GraspResults, assemble_bin_map
+from reachmap.scans.bin_results import NO_PATH, GraspResults, assemble_bin_map
 from reachmap.scans.bin_roadmap import (
     BinRoadmap,
     components_from_payload,
@@ -28,11 +28,15 @@ from reachmap.scans.bin_roadmap import (
     grasp_grid,
     join_components,
 )
+from reachmap.scans.cycle.planning import CycleKnowledge, CyclePlanner
+from reachmap.scans.cycle.results import CycleResults
+from reachmap.scans.cycle.scenes import CycleScenes, stages_of
+from reachmap.scans.cycle.stages import knowledge_of
 from reachmap.scans.document import journal_settings
 from reachmap.scans.ik_survey import Survey
 from reachmap.scans.margins import MarginMeter
 from reachmap.scans.measured import MEASURED, Meter, attempt_seed
-from reachmap.scans.routes import RouteAttempts
+from reachmap.scans.routes import RouteAttempts, WayIn
 
 if TYPE_CHECKING:
     from reachmap.cell.loading import LoadedCell
@@ -52,11 +56,14 @@ class BinContext:
         Of the test grasps of each.
     body_pairs : tuple of str
         As the map numbers them.
+    cycles : tuple of CycleKnowledge or None
+        Of each filling, where the cell has a part.
     """
 
     fillings: tuple[LoadedCell, ...]
     known: tuple[BinRoadmap, ...]
     body_pairs: tuple[str, ...]
+    cycles: tuple[CycleKnowledge | None, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,7 +109,12 @@ def bin_work(scene: Scene, document: Mapping[str, Any]) -> Work:
         units=units,
         job=partial(planning_job, scene, tuple(document["body_pairs"])),
         settings=journal_settings(document),
-        document={**document, "grasps": grasps, "fillings": fillings},
+        document={
+            **document,
+            "grasps": grasps,
+            "fillings": fillings,
+            "stages": list(stages_of(scene.loaded)),
+        },
         frames=grasps,
     )
 
@@ -120,20 +132,30 @@ def pairs_of_fillings(loaded: LoadedCell) -> list[str]:
         scene = Scene.shared(filling, with_bin=True)
         scene.require_free_scan_configuration()
         found |= dict.fromkeys(scene.checker.body_pairs)
+    for filling in loaded.fillings():
+        scenes = CycleScenes.of(filling)
+        found |= dict.fromkeys(() if scenes is None else scenes.body_pairs)
     return list(found)
 
 
 def planning_job(scene: Scene, body_pairs: tuple[str, ...], stages: Stages) -> Job:
     """Survey the test grasps and connect them; what is left is to plan to each."""
     fillings = scene.loaded.fillings()
-    known = tuple(
-        connected_grasps(
-            Scene.shared(filling, with_bin=True),
-            stages if len(fillings) == 1 else _OneFilling(stages, f"_fill_{k}"),
+    known, cycles = [], []
+    for k, filling in enumerate(fillings):
+        one = stages if len(fillings) == 1 else _OneFilling(stages, f"_fill_{k}")
+        known.append(connected_grasps(Scene.shared(filling, with_bin=True), one))
+        cycles.append(
+            knowledge_of(filling, known[-1], body_pairs, one)
+            if filling.cell.held()
+            else None
         )
-        for k, filling in enumerate(fillings)
+    whole = BinContext(
+        fillings=fillings,
+        known=tuple(known),
+        body_pairs=body_pairs,
+        cycles=tuple(cycles),
     )
-    whole = BinContext(fillings=fillings, known=known, body_pairs=body_pairs)
     return Job(function=plan_unit, context=whole, tally=tally)
 
 
@@ -145,8 +167,13 @@ def plan_unit(context: BinContext, grasps: range) -> dict[str, Any]:
     each = len(context.known[0].component)
     layer, first = divmod(grasps.start, each)
     scene = Scene.shared(context.fillings[layer], with_bin=True)
-    known = context.known[layer]
-    results = plan_grasps(scene, known, range(first, first + len(grasps)))
+    known, cycle = context.known[layer], context.cycles[layer]
+    results = plan_grasps(
+        scene,
+        known,
+        range(first, first + len(grasps)),
+        CyclePlanner.of(scene.loaded, known, cycle),
+    )
     number = {name: k for k, name in enumerate(context.body_pairs)}
     payload = dataclasses.asdict(
         GraspResults.join(results).renumbered(
@@ -160,7 +187,10 @@ def plan_unit(context: BinContext, grasps: range) -> dict[str, Any]:
 
 
 def plan_grasps(
-    scene: Scene, known: BinRoadmap, grasps: Sequence[int]
+    scene: Scene,
+    known: BinRoadmap,
+    grasps: Sequence[int],
+    cycle: CyclePlanner | None = None,
 ) -> list[GraspResults]:
     """Make all attempts at some test grasps.
 
@@ -170,6 +200,8 @@ def plan_grasps(
     known : BinRoadmap
     grasps : sequence of int
         Their numbers in the survey, which with the cell's seed make their own.
+    cycle : CyclePlanner, optional
+        Plans what follows.
     """
     spec, survey = scene.loaded.cell.bin_scan, known.survey
     attempts = RouteAttempts(scene, survey, known.routes)
@@ -181,7 +213,7 @@ def plan_grasps(
     for grasp, made in zip(grasps, plans, strict=True):
         missed = all(plan.path is None for plan, _ in made)
         own = attempts.own(grasp) if missed else None
-        results.append(_results(scene, known, grasp, made, own, margins))
+        results.append(_results(scene, known, grasp, made, own, margins, cycle))
     return results
 
 
@@ -216,28 +248,36 @@ def _results(
     plans: Sequence[tuple[PlanResult, int]],
     own: tuple[FloatArray, int] | None,
     margins: MarginMeter,
+    cycle: CyclePlanner | None,
 ) -> GraspResults:
     survey, repeats = known.survey, scene.loaded.cell.bin_scan.repeats
     measured = np.full((1, repeats, len(MEASURED)), np.nan)
     numbers_of_own = np.full((1, len(MEASURED)), np.nan)
-    out_of_time = np.zeros((1, repeats), np.uint8)
-    checks = np.zeros((1, repeats), np.int64)
-    found: list[tuple[FloatArray, int, int, int]] = []
+    found: list[WayIn] = []
     meter = Meter(scene)
     for repeat, (plan, goal) in enumerate(plans):
-        out_of_time[0, repeat] = plan.hit_time_limit
-        checks[0, repeat] = plan.checks
-        if plan.path is None:
-            continue
-        way = survey.way_from(goal, plan.path[-1])
-        measured[0, repeat] = meter.measured(plan, way)
-        found.append((np.vstack([plan.path, way[1:]]), len(plan.path), repeat, goal))
+        if plan.path is not None:
+            way = survey.way_from(goal, plan.path[-1])
+            measured[0, repeat] = meter.measured(plan, way)
+            found.append(WayIn.of(plan.path, way, repeat, goal))
     if own is not None:
-        path, goal = own
-        way = survey.way_from(goal, path[-1])
-        numbers_of_own[0] = meter.measured(PlanResult.without_search(path), way)
-        found.append((np.vstack([path, way[1:]]), len(path), -1, goal))
-    best = min(found, key=lambda entry: path_length_rad(entry[0]), default=None)
+        found.append(WayIn.of(own[0], survey.way_from(own[1], own[0][-1]), -1, own[1]))
+    best = min(found, key=lambda way: path_length_rad(way.path), default=None)
+    after = None if cycle is None else cycle.plan(grasp, found)
+    if after is not None and after.way_in is not None:
+        # What a line runs is the whole cycle, whichever way in is the shortest.
+        best = after.way_in
+        if best.repeat < 0:
+            found = [*(way for way in found if way.repeat >= 0), best]
+    for way_in in found:
+        if way_in.repeat < 0:
+            path = way_in.path[: way_in.planned]
+            approach = way_in.path[way_in.planned - 1 :]
+            plan = PlanResult.without_search(path)
+            numbers_of_own[0] = meter.measured(plan, approach)
+    paths = [(way.path, way.planned, way.repeat, 0) for way in found]
+    for stage, (path, planned) in enumerate(() if after is None else after.paths):
+        paths.append((path, planned, -1, stage + 1))
     connected = known.routes.over_roadmap(survey, grasp) is not None
     return GraspResults(
         status=np.array([_status(survey, grasp, found=bool(found))], np.uint8),
@@ -246,24 +286,36 @@ def _results(
         connected=np.array([connected], np.uint8),
         blocking_pair=survey.blocking_pair[[grasp]],
         path_found=np.isfinite(measured[..., 0]).astype(np.uint8),
-        hit_time_limit=out_of_time,
-        checks=checks,
+        hit_time_limit=_per_attempt(plans, "hit_time_limit", repeats, np.uint8),
+        checks=_per_attempt(plans, "checks", repeats, np.int64),
         measured=measured,
         own=numbers_of_own,
         component=known.component[[grasp]],
         winning_roll=np.array(
-            [np.nan if best is None else survey.roll_of(grasp, best[3])]
+            [np.nan if best is None else survey.roll_of(grasp, best.goal)]
         ),
         margins=np.array(
-            [[np.nan] * 4 if best is None else margins.of_path(best[0], best[1])]
+            [[np.nan] * 4 if best is None else margins.of_path(*best[:2])]
         ),
         configuration=np.vstack(
-            [np.zeros((0, scene.robot.dof)), *(entry[0] for entry in found)]
+            [np.zeros((0, scene.robot.dof)), *(entry[0] for entry in paths)]
         ),
-        row_size=np.array([len(entry[0]) for entry in found], np.int64),
-        planned_size=np.array([entry[1] for entry in found], np.int64),
-        place=np.array([(0, entry[2]) for entry in found], np.int64).reshape(-1, 2),
+        row_size=np.array([len(entry[0]) for entry in paths], np.int64),
+        planned_size=np.array([entry[1] for entry in paths], np.int64),
+        place=np.array([(0, entry[2]) for entry in paths], np.int64).reshape(-1, 2),
+        stage=np.array([entry[3] for entry in paths], np.uint8),
+        best_repeat=np.array([NO_PATH if best is None else best.repeat], np.int64),
+        cycle=None if after is None else CycleResults.of([after]),
     )
+
+
+def _per_attempt(
+    plans: Sequence[tuple[PlanResult, int]], name: str, repeats: int, dtype: type
+) -> Any:
+    """A number of each attempt that was made, 0 of the others, shape (1, repeats)."""
+    values: Any = np.zeros((1, repeats), dtype)
+    values[0, : len(plans)] = [getattr(plan, name) for plan, _ in plans]
+    return values
 
 
 def _status(survey: Survey, grasp: int, *, found: bool) -> int:
@@ -286,7 +338,11 @@ def blank(document: Mapping[str, Any], unit: int, status: Status) -> dict[str, A
     each = document["grasps"] // document.get("fillings", 1)
     left = each - unit % -(-each // GRASPS_PER_UNIT) * GRASPS_PER_UNIT
     empty = GraspResults.blank(
-        min(GRASPS_PER_UNIT, left), spec.repeats, len(document["joint_names"]), status
+        min(GRASPS_PER_UNIT, left),
+        spec.repeats,
+        len(document["joint_names"]),
+        status,
+        stages=len(document.get("stages", ())),
     )
     return dataclasses.asdict(empty)
 
@@ -302,6 +358,8 @@ def assemble(
         components = fields.pop("components", None)
         if components is not None:
             evidence.append(components_from_payload(components))
+        if fields["cycle"] is not None:
+            fields["cycle"] = CycleResults(**fields["cycle"])
         parts.append(GraspResults(**fields))
     complete = len(evidence) == document.get("fillings", 1)
     return assemble_bin_map(

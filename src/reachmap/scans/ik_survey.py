@@ -17,6 +17,7 @@ from reachmap.core.kinematics.windings import TURN_RAD, Windings
 from reachmap.core.planning.approach import StraightApproach
 from reachmap.core.planning.roadmap import Goals
 from reachmap.core.scene import Scene
+from reachmap.geometry import axis_vector
 from reachmap.maps.records import NO_PAIR, Status, freeze
 from reachmap.runtime.job import Job, Stages
 from reachmap.sampling.frames import FrameGrid, FrameList
@@ -189,7 +190,7 @@ class _Surveyor:
         self._approach = StraightApproach(
             scene.kinematics,
             scene.motions,
-            scene.loaded.cell.robot.tcp.approach_axis,
+            axis_vector(scene.loaded.cell.robot.tcp.approach_axis),
             approach_m,
         )
         self._windings = Windings(scene.robot)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import dataclasses
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -24,6 +25,32 @@ from reachmap.core.planning.timing import path_length_rad
 from reachmap.core.scene import Scene
 from reachmap.scans.ik_survey import Survey
 from reachmap.scans.measured import attempt_seed
+
+
+class WayIn(NamedTuple):
+    """A verified path from the scan configuration to a grasp.
+
+    Attributes
+    ----------
+    path : array, shape (n, dof)
+        Straight approach included.
+    planned : int
+        Way-points of its planned part.
+    repeat : int
+        Attempt that it is, -1 for none.
+    goal : int
+        Row of the goal that it ends at.
+    """
+
+    path: FloatArray
+    planned: int
+    repeat: int
+    goal: int
+
+    @classmethod
+    def of(cls, path: FloatArray, way: FloatArray, repeat: int, goal: int) -> WayIn:
+        """A planned path (n, dof) and the approach (m, dof) that it ends at."""
+        return cls(np.vstack([path, way[1:]]), len(path), repeat, goal)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -85,6 +112,25 @@ class Routes:
             cell.seed,
         )
         return cls(paths=paths, node=node, network=network)
+
+    def payload(self) -> dict[str, Any]:
+        """What a store keeps of them."""
+        network = self.network
+        return {
+            "paths": dataclasses.asdict(self.paths),
+            "node": self.node,
+            "network": None if network is None else dataclasses.asdict(network),
+        }
+
+    @classmethod
+    def from_payload(cls, payload: Mapping[str, Any]) -> Routes:
+        """What a store has kept."""
+        network = payload["network"]
+        return cls(
+            paths=ShortestPaths(**payload["paths"]),
+            node=payload["node"],
+            network=None if network is None else RouteNetwork(**network),
+        )
 
     @property
     def length_rad(self) -> FloatArray:

@@ -18,6 +18,8 @@ from reachmap.runtime.run import run_scan
 from reachmap.sampling.frames import approach_distance_m
 from reachmap.scans.bin_roadmap import grasp_grid, roadmap_of
 from reachmap.scans.bin_scan import bin_work, pairs_of_fillings, plan_grasps
+from reachmap.scans.cycle.part_fit import require_room_for_part
+from reachmap.scans.cycle.scenes import CycleScenes, stages_of
 from reachmap.scans.document import checking_settings, scan_document
 from reachmap.scans.ik_survey import survey_frames
 from reachmap.tools.options import cell_of_artefact, warn_of_nothing, with_seed
@@ -99,6 +101,10 @@ def bin_scan_work(loaded: LoadedCell, source_sha256: str = "") -> Work:
     """
     scene = Scene.shared(loaded, with_bin=True)
     scene.require_free_scan_configuration()
+    scenes = CycleScenes.of(loaded)
+    if scenes is not None:
+        scenes.home()
+        require_room_for_part(scenes)
     document = scan_document(
         scene,
         body_pairs=pairs_of_fillings(loaded),
@@ -186,4 +192,5 @@ def _settings(scene: Scene) -> dict[str, Any]:
         "fill_m": list(cell.bin_scan.layers) if cell.bin_scan.is_filled else None,
         "press_in_m": cell.bin_scan.press_in_m if cell.bin_scan.is_filled else None,
         "approach_distance_m": approach_distance_m(cell),
+        **({"cycle_stages": list(stages_of(scene.loaded))} if cell.held() else {}),
     }

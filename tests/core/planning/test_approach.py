@@ -7,7 +7,7 @@ import pytest
 
 from reachmap.core.kinematics.kinematics import Kinematics
 from reachmap.core.planning.approach import StraightApproach
-from reachmap.geometry import rotation_angle
+from reachmap.geometry import axis_vector, rotation_angle
 from tests.support.scenes import scene_of
 
 DISTANCE_M = 0.05
@@ -16,7 +16,9 @@ DISTANCE_M = 0.05
 def approach_of(scene, distance_m=DISTANCE_M):
     """Approaches along the tool of a scene."""
     axis = scene.loaded.cell.robot.tcp.approach_axis
-    return StraightApproach(scene.kinematics, scene.motions, axis, distance_m)
+    return StraightApproach(
+        scene.kinematics, scene.motions, axis_vector(axis), distance_m
+    )
 
 
 def deviation(scene, way, T_end, samples=9):

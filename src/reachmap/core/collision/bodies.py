@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import pinocchio as pin
@@ -23,6 +23,8 @@ from reachmap.cell.meshes.reading import MeshError, read_mesh
 from reachmap.cell.model.bin_parts import BinPart, bin_parts
 from reachmap.cell.model.fields import Shape
 from reachmap.cell.model.shapes import Solid
+from reachmap.cell.pick_cycle import PART
+from reachmap.core.collision.held_part import HeldPart
 from reachmap.core.collision.shapes import coal_shape
 from reachmap.core.robot.model import RobotModel
 from reachmap.core.robot.urdf_joints import LINK_MARK
@@ -33,6 +35,9 @@ if TYPE_CHECKING:
     from reachmap.cell.loading import LoadedCell
 
 ROOT = 0
+BOTTOM, HEAP, SHELL = "bin bottom", "bin heap", "bin shell"
+LAIN_ON = (BOTTOM, HEAP)
+"""Parts of a bin that a part may lie on."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -86,8 +91,12 @@ def bin_placements(robot: RobotModel, loaded: LoadedCell) -> dict[str, FloatArra
     }
 
 
+Load = Literal["empty", "lifted", "carried"]
+"""What hangs on the tool: nothing, the part still on what it lay on, or the part."""
+
+
 def build_geometry(
-    robot: RobotModel, loaded: LoadedCell, *, with_bin: bool
+    robot: RobotModel, loaded: LoadedCell, *, with_bin: bool, load: Load = "empty"
 ) -> BodyGeometry:
     """Assemble the geometry of a cell.
 
@@ -97,6 +106,9 @@ def build_geometry(
     loaded : LoadedCell
     with_bin : bool
         Whether the bin stands in the scene.
+    load : Load
+        Whether the cell's part is a body, called ``part``. While it is lifted, what it
+        lay on is left to :mod:`reachmap.core.planning.lift`.
 
     Raises
     ------
@@ -109,6 +121,10 @@ def build_geometry(
         joint, T_joint_frame = robot.frame_placement(body.attach_to)
         shape = _body_shape(loaded, body.name, body.shape)
         builder.add(body.name, joint, T_joint_frame @ body.pose.matrix(), shape)
+    held = None if load == "empty" else HeldPart.of(loaded)
+    if held is not None:
+        T = robot.T_joint_tcp @ held.T_tcp_part
+        builder.add(PART, robot.tcp_joint, T, held.solid)
     if with_bin:
         placements = bin_placements(robot, loaded)
         for part in parts_of_bin(loaded):
@@ -116,12 +132,35 @@ def build_geometry(
     touches = [(body.name, body.touch) for body in loaded.cell.bodies]
     if with_bin:
         touches.append(("bin", loaded.cell.bin.touch))
+    if held is not None:
+        touches.append((PART, held.touch))
     builder.allow(touches, with_bin=with_bin)
+    if held is not None and with_bin and load == "lifted":
+        _let_part_leave(builder, loaded)
     return BodyGeometry(
         geometry=builder.geometry,
         names=tuple(builder.names),
         shapes=tuple(builder.shapes),
     )
+
+
+def _let_part_leave(builder: _Builder, loaded: LoadedCell) -> None:
+    """Take out the pairs of a part and what it lies on.
+
+    The bottom of a bin that is a mesh is part of its shell, which is lowered for the
+    part by what the part may be inside it: its walls stay where they are.
+    """
+    names = [part.name for part in parts_of_bin(loaded)]
+    builder.remove((PART, name) for name in LAIN_ON if name in names)
+    if SHELL not in names:
+        return
+    cell = loaded.cell
+    lowered = bin_placements(builder.robot, loaded)[SHELL].copy()
+    down_m = cell.lift.contact_allowance_m + cell.collision.safety_margin_m
+    lowered[:3, 3] -= down_m * lowered[:3, 2]
+    shell = builder.shapes[builder.names.index(SHELL)]
+    builder.remove([(PART, SHELL)])
+    builder.add(SHELL, ROOT, lowered, shell, PART)
 
 
 def _add_links(builder: _Builder, loaded: LoadedCell) -> None:
@@ -186,9 +225,14 @@ class _Builder:
         self.shapes: list[Solid] = []
 
     def add(
-        self, name: str, joint: int, T_joint_body: FloatArray, shape: Solid
+        self,
+        name: str,
+        joint: int,
+        T_joint_body: FloatArray,
+        shape: Solid,
+        only: str | None = None,
     ) -> None:
-        """Add one body and pair it with everything on other joints."""
+        """Add one body and pair it with all on other joints, or with one body only."""
         placement = pin.SE3(np.ascontiguousarray(T_joint_body))
         # The engine wants names that differ; a link may have several shapes.
         index = self.geometry.addGeometryObject(
@@ -197,6 +241,8 @@ class _Builder:
             )
         )
         for other in range(index):
+            if only not in (None, self.names[other]):
+                continue
             if self.geometry.geometryObjects[other].parentJoint != joint:
                 self.geometry.addCollisionPair(pin.CollisionPair(other, index))
         self.names.append(name)

@@ -9,7 +9,7 @@ import numpy as np
 from reachmap._typing import FloatArray
 from reachmap.core.kinematics.kinematics import Kinematics
 from reachmap.core.planning.motion import MotionChecker
-from reachmap.geometry import AXES, rotation_angle
+from reachmap.geometry import rotation_angle
 
 STEP_M = 0.01
 # A joint that moves further from step to step may have turned over to another branch;
@@ -22,14 +22,14 @@ STRAIGHT_M, STRAIGHT_RAD = 1e-4, math.radians(0.05)
 
 
 class StraightApproach:
-    """Finds and verifies straight approaches along the tool's approach axis.
+    """Finds and verifies straight ways of the tool that end at a grasp.
 
     Parameters
     ----------
     kinematics : Kinematics
     motions : MotionChecker
-    approach_axis : str
-        Axis of the TCP that points into the object, as in ``"+z"``.
+    direction : array, shape (3,)
+        Unit vector of the way in the TCP frame; the approach axis as a rule.
     distance_m : float
         From the pre-grasp to the grasp; 0 for none.
     """
@@ -38,16 +38,16 @@ class StraightApproach:
         self,
         kinematics: Kinematics,
         motions: MotionChecker,
-        approach_axis: str,
+        direction: FloatArray,
         distance_m: float,
     ) -> None:
         self._kinematics, self._motions = kinematics, motions
         self.distance_m = distance_m
+        self._direction = direction
         steps = math.ceil(distance_m / STEP_M)
-        axis, sign = self._axis, self._sign = AXES[approach_axis]
         self._retreats = np.tile(np.eye(4), (steps, 1, 1))
         along = np.arange(1, steps + 1) * (distance_m / max(steps, 1))
-        self._retreats[:, axis, 3] = -sign * along
+        self._retreats[:, :3, 3] = -along[:, None] * direction
 
     def of(self, T_base_tcp: FloatArray, q_grasp: FloatArray) -> FloatArray | None:
         """Configurations from the pre-grasp to the grasp.
@@ -97,7 +97,7 @@ class StraightApproach:
 
     def _retreat(self, distance_m: float) -> FloatArray:
         T = np.eye(4)
-        T[self._axis, 3] = -self._sign * distance_m
+        T[:3, 3] = -distance_m * self._direction
         return T
 
     def straightened(self, way: FloatArray) -> FloatArray | None:
@@ -119,8 +119,8 @@ class StraightApproach:
             middle = (way[:-1] + way[1:]) / 2
             T = self._kinematics.forward_many(middle)
             offset = (T[:, :3, 3] - T_end[:3, 3]) @ T_end[:3, :3]
-            along_m = -self._sign * offset[:, self._axis]
-            aside_m = np.delete(offset, self._axis, axis=1)
+            along_m = -(offset @ self._direction)
+            aside_m = offset + along_m[:, None] * self._direction
             bent = np.flatnonzero(
                 (np.linalg.norm(aside_m, axis=1) > STRAIGHT_M)
                 | (rotation_angle(T[:, :3, :3], T_end[:3, :3]) > STRAIGHT_RAD)

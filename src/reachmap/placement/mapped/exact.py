@@ -19,7 +19,7 @@ from reachmap.core.planning.approach import StraightApproach
 from reachmap.core.planning.connection import Connection, connect
 from reachmap.core.planning.roadmap import Goals
 from reachmap.core.scene import Scene
-from reachmap.geometry import yaw_transform
+from reachmap.geometry import axis_vector, yaw_transform
 from reachmap.placement.mapped.sample import Sample, rolls_of
 from reachmap.sampling.frames import approach_distance_m
 
@@ -107,7 +107,7 @@ class PlacedScene:
         self._approach = StraightApproach(
             self.scene.kinematics,
             self.scene.motions,
-            cell.robot.tcp.approach_axis,
+            axis_vector(cell.robot.tcp.approach_axis),
             approach_distance_m(cell),
         )
         self._survey()

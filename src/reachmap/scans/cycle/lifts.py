@@ -1,0 +1,125 @@
+"""Lifts from every configuration at which a grasp can be reached."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from reachmap._typing import CodeArray, FloatArray, IntArray
+from reachmap.core.planning.lift import Lifts
+from reachmap.maps.parts import StageStatus, freeze
+from reachmap.maps.records import NO_PAIR
+from reachmap.runtime.job import Job, Stages, blocks
+from reachmap.scans.cycle.scenes import CycleScenes
+from reachmap.scans.cycle.ways import Ways
+
+if TYPE_CHECKING:
+    from reachmap.cell.loading import LoadedCell
+    from reachmap.scans.bin_roadmap import BinRoadmap
+
+LIFTS_PER_UNIT = 200
+NEAREST_TO_SUCCESS = (
+    StageStatus.LIFT_BLOCKED,
+    StageStatus.LIFT_OUT_OF_REACH,
+    StageStatus.PART_IN_COLLISION,
+)
+"""States without a lift, the one nearest to success first."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class LiftSurvey:
+    """Lifts from goals.
+
+    Attributes
+    ----------
+    status : uint8 array, shape (goals,)
+        :class:`StageStatus`; NOT_ATTEMPTED where no path leads to the grasp.
+    blocking_pair : int array, shape (goals,)
+        Index into the map's ``body_pairs``, -1 where there is none.
+    ways : Ways
+        From the grasp to the end of the lift; empty without one.
+    """
+
+    status: CodeArray
+    blocking_pair: IntArray
+    ways: Ways
+
+    def __post_init__(self) -> None:
+        freeze(self)
+
+    def verdict(self, goals: IntArray) -> tuple[int, int]:
+        """Status of a grasp none of whose goals has a lift, and the pair to blame."""
+        status = self.status[goals]
+        for code in NEAREST_TO_SUCCESS:
+            if (status == code).any():
+                pairs = self.blocking_pair[goals[status == code]]
+                pairs = pairs[pairs >= 0]
+                pair = int(np.bincount(pairs).argmax()) if len(pairs) else NO_PAIR
+                return int(code), pair
+        return int(StageStatus.NOT_ATTEMPTED), NO_PAIR
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class LiftContext:
+    """What a worker needs: the cell, and configurations (n, dof) at grasps."""
+
+    loaded: LoadedCell
+    body_pairs: tuple[str, ...]
+    Q: FloatArray
+
+
+def lift_in_stages(
+    loaded: LoadedCell, known: BinRoadmap, body_pairs: tuple[str, ...], stages: Stages
+) -> LiftSurvey:
+    """Lift the part from every goal of the grasps that are reached."""
+    survey = known.survey
+    connected = np.isin(
+        survey.frame, survey.frame[np.isfinite(known.routes.length_rad)]
+    )
+    rows = np.flatnonzero(connected)
+    ends = survey.way[survey.way_begin + survey.way_size - 1]
+    context = LiftContext(loaded=loaded, body_pairs=body_pairs, Q=ends[rows])
+    payloads = stages.run(
+        "lift",
+        Job(function=lift_unit, prepare=prepare, context=context),
+        [(part.start, part.stop) for part in blocks(len(rows), LIFTS_PER_UNIT)],
+    )
+    status = np.zeros(len(survey.frame), np.uint8)
+    pair = np.full(len(survey.frame), NO_PAIR, np.int64)
+    size = np.zeros(len(survey.frame), np.int64)
+    found = Ways.join([payload["ways"] for payload in payloads], ends.shape[1])
+    if len(rows):
+        status[rows] = np.concatenate([payload["status"] for payload in payloads])
+        pair[rows] = np.concatenate([p["blocking_pair"] for p in payloads])
+        size[rows] = found.size
+    return LiftSurvey(
+        status=status, blocking_pair=pair, ways=Ways(point=found.point, size=size)
+    )
+
+
+def prepare(context: LiftContext) -> tuple[LiftContext, Lifts]:
+    """Build the scenes, once per worker."""
+    scenes = CycleScenes.of(context.loaded)
+    assert scenes is not None
+    return context, Lifts(scenes.lifted, scenes.carried, scenes.part)
+
+
+def lift_unit(
+    state: tuple[LiftContext, Lifts], block: tuple[int, int]
+) -> dict[str, Any]:
+    """Lift the part from one block of configurations."""
+    context, lifts = state
+    made = [lifts.of(q) for q in context.Q[slice(*block)]]
+    number = {name: k for k, name in enumerate(context.body_pairs)}
+    dof = context.Q.shape[1]
+    ways = Ways.of([lift.way.reshape(-1, dof) for lift in made], dof)
+    return {
+        "status": np.array([lift.status for lift in made], np.uint8),
+        "blocking_pair": np.array(
+            [number.get(lift.blocking_pair, NO_PAIR) for lift in made], np.int64
+        ),
+        "ways": dataclasses.asdict(ways),
+    }

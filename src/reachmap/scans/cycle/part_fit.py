@@ -1,0 +1,71 @@
+"""Whether the part of a cell can be in its bin at all."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from reachmap._typing import BoolArray, FloatArray
+from reachmap.cell.model.tool import LISTED
+from reachmap.core.collision.bodies import LAIN_ON, ROOT, parts_of_bin
+from reachmap.core.collision.shapes import coal_shape
+from reachmap.core.collision.static_bodies import PlacedBodies, PlacedBody
+from reachmap.errors import SceneError
+from reachmap.geometry import inverse_transform, transform_from_parts
+from reachmap.sampling.frames import bin_test_frames
+from reachmap.scans.cycle.scenes import CycleScenes
+
+
+def require_room_for_part(scenes: CycleScenes) -> None:
+    """Refuse a part that starts inside the bin itself at every test grasp.
+
+    Where it does at some, the map says so for each.
+
+    Raises
+    ------
+    SceneError
+        A sentence that says where the part is and what may be changed.
+    """
+    loaded = scenes.empty.loaded
+    cell, T_base_bin = loaded.cell, scenes.empty.T_base_bin
+    if cell.tool.roll != LISTED:
+        return  # other rolls than those of the test grasps will do, too
+    frames = bin_test_frames(cell, T_base_bin).T_base_tcp.reshape(-1, 4, 4)
+    T_bin_tcp = inverse_transform(T_base_bin) @ frames
+    height = T_bin_tcp[:, 2, :3] @ scenes.part.points.T + T_bin_tcp[:, 2, 3:]
+    lowest_m = height.min(axis=1)
+    above = lowest_m >= -cell.lift.contact_allowance_m
+    many, source = f"all {len(frames)} test grasps", loaded.source
+    if not above.any():
+        raise SceneError(
+            f"{source}: part: it starts {-1e3 * lowest_m.max():.3g} mm or more inside "
+            f"the bin bottom at {many} (lift.contact_allowance_m: "
+            f"{1e3 * cell.lift.contact_allowance_m:g} mm); raise bin_scan.layers, or "
+            "change part.shape or part.pose"
+        )
+    wall = _wall_around(scenes, T_bin_tcp, above)
+    if wall:
+        raise SceneError(
+            f"{source}: part: it starts inside a wall at {many} ({wall}, for one); "
+            "change part.shape or part.pose"
+        )
+
+
+def _wall_around(scenes: CycleScenes, T_bin_tcp: FloatArray, wanted: BoolArray) -> str:
+    """A wall that the part is in, "" where it is clear of all at some grasp."""
+    part = scenes.part
+    walls = PlacedBodies(
+        PlacedBody(
+            name=wall.name,
+            joint=ROOT,
+            shape=coal_shape(wall.shape),
+            T=transform_from_parts(np.eye(3), wall.centre_m),
+        )
+        for wall in parts_of_bin(scenes.empty.loaded)
+        if wall.name not in LAIN_ON
+    )
+    shape, hit = coal_shape(part.solid), -1
+    for T in T_bin_tcp[wanted]:
+        hit = walls.first_touched(shape, T @ part.T_tcp_part)
+        if hit < 0:
+            return ""
+    return walls.bodies[hit].name
