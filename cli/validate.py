@@ -50,6 +50,12 @@ from reachmap.cli.options import list_options
     metavar="PATH",
     help="Draw predicted against measured cost, and the first grasps of each order.",
 )
+@click.option(
+    "--calibrate",
+    is_flag=True,
+    help="Keep MAP.calibration.json beside the map, with which `rank` gives calibrated "
+    "probabilities.",
+)
 @options.output_option(help="Write the results of every grasp here, as JSON.")
 @options.set_option
 @options.seed_option
@@ -76,6 +82,7 @@ def command(
     format_name: str | None,
     frame: str | None,
     chart: Path | None,
+    calibrate: bool,
     output: Path | None,
     overrides: tuple[str, ...],
     seed: int | None,
@@ -96,11 +103,12 @@ def command(
     Example:
       reachmap validate bin.h5 grasps.json --chart validation.png
       reachmap validate bin.h5 --random 500 -o results.json
+      reachmap validate bin.h5 --random 1000 --calibrate
     """
     if not grasps:
         options.unused("format_name", "frame", because="needs GRASPS")
-    if output is None and chart is None:
-        options.unused("overwrite", because="needs --output or --chart")
+    if output is None and chart is None and not calibrate:
+        options.unused("overwrite", because="needs --output, --chart or --calibrate")
     options.check_workers(executor)
     from reachmap.cli.text.validate import validation_text
     from reachmap.ranking.lookup.settings import CostBasis, RankSettings
@@ -126,6 +134,7 @@ def command(
         top=top,
         output=output,
         chart=chart,
+        calibrate=calibrate,
         run=RunOptions(
             workers=workers,
             executor=executor,

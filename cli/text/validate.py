@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from reachmap.cli.text.info import reliability_lines
 from reachmap.cli.text.tables import fact_lines, table_lines
 from reachmap.text import plural, printable
+from reachmap.validation.calibration import ReliabilityDiagram
 from reachmap.validation.statistics import Confusion, Share
 from reachmap.validation.summary import (
     GroupSummary,
@@ -30,6 +31,8 @@ def validation_text(validation: Validation) -> str:
             "",
             "Predictions (Wilson 95 % intervals)",
             *_share_lines(overall),
+            "",
+            *_diagram_lines(validation.diagram),
             "",
             "What J is made of: share of the variance of an attempt that is the grasp",
             *reliability_lines(validation.reliability),
@@ -83,6 +86,28 @@ def _share_lines(summary: ListSummary) -> list[str]:
             ),
         ]
     )
+
+
+def _diagram_lines(diagram: ReliabilityDiagram) -> list[str]:
+    head = (
+        f"Probability of being reached: calibration error {_number(diagram.error, 3)} "
+        f"over {plural(diagram.grasps, 'grasp')}, Brier score "
+        f"{_number(diagram.brier, 3)}"
+    )
+    rows = [["predicted", "mean", "reached", "of", "%", "95 % interval"]]
+    for one in diagram.bins:
+        hit = one.reached
+        rows.append(
+            [
+                f"{one.low:.1f} to {one.high:.1f}",
+                f"{one.predicted:.3f}",
+                str(hit.hits),
+                str(hit.total),
+                _percent(hit),
+                f"{100 * hit.low:.1f} to {100 * hit.high:.1f}",
+            ]
+        )
+    return [head, *table_lines(rows, "<>>>>>")]
 
 
 def _share_text(share: Share) -> str:

@@ -54,7 +54,7 @@ def test_every_result_has_the_fields_of_the_contract(folder):
     keys = {
         "rank", "original_rank", "quadrant_rank", "original_quadrant_rank", "cost",
         "terms", "status", "test_grasp", "layer", "distance", "angle",
-        "orientation_wxyz",
+        "orientation_wxyz", "probability",
     }  # fmt: skip
     states = set()
     for grasp in ranked("pile-1.json")["grasps"]:

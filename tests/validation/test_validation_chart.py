@@ -24,7 +24,7 @@ def validation(toy_map, tmp_path_factory):
 
 def test_bars_are_measured_means(validation):
     """Three segments for each order of each group; grey where one was not reached."""
-    _, bars = validation_chart(validation).axes
+    _, bars, _ = validation_chart(validation).axes
     drawn = [p for p in bars.patches if isinstance(p, Rectangle)]
     heights = {
         round(p.get_x() + p.get_width() / 2, 6): 0.0
@@ -47,7 +47,7 @@ def test_bars_are_measured_means(validation):
 
 def test_points_are_grasps(validation):
     """Reached grasps at their costs, the others as crosses on the upper edge."""
-    costs, _ = validation_chart(validation).axes
+    costs, *_ = validation_chart(validation).axes
     (one,) = validation.lists
     reached, missed = (np.asarray(c.get_offsets()) for c in costs.collections)
     both = one.predicted & one.reached
@@ -60,7 +60,7 @@ def test_points_are_grasps(validation):
 def test_many_groups_are_cut_short(validation):
     """A page has room for twenty-four quadrants; what is left out is said."""
     many = dataclasses.replace(validation, groups=validation.groups * 10)
-    _, bars = validation_chart(many).axes
+    _, bars, _ = validation_chart(many).axes
     assert len(bars.get_xticks()) == 3 * 24
     assert bars.get_title(loc="right") == f"first 24 of {len(many.groups)} groups"
 
@@ -74,3 +74,11 @@ def test_names_of_files_are_no_formulas(validation):
     figure = validation_chart(odd)
     figure.canvas.draw()
     assert r"a \$x_{\$ b \n c" in [t.get_text() for t in figure.axes[1].texts]
+
+
+def test_the_reliability_diagram_shows_each_bin(validation):
+    """A point at the mean probability and the frequency of every bin with grasps."""
+    diagram = validation_chart(validation).axes[2]
+    drawn = [np.asarray(dot.get_offsets())[0] for dot in diagram.collections]
+    wanted = [(one.predicted, one.reached.share) for one in validation.diagram.bins]
+    np.testing.assert_allclose(drawn, wanted)

@@ -24,6 +24,7 @@ from reachmap.plots.parts.style import (
 from reachmap.plots.ranking import TERM_COLOURS, term_label
 from reachmap.ranking.lookup.table import TERMS
 from reachmap.text import printable
+from reachmap.validation.calibration import ReliabilityDiagram
 from reachmap.validation.judgement import ORDERS, JudgedList
 from reachmap.validation.statistics import Share
 from reachmap.validation.summary import GroupSummary, OrderFigures, Validation
@@ -35,12 +36,12 @@ LABEL_WIDTH: Final = 18
 BAR_WIDTH: Final = 0.26
 PLACES: Final = (-0.28, 0.0, 0.28)
 SHORT: Final = ("supplied", "re-ranked", "IK only")
-LEFT, BOTTOM, SIDE, GAP = 0.75, 1.0, 3.3, 0.85
+LEFT, BOTTOM, SIDE, GAP, DIAGRAM = 0.75, 1.0, 3.3, 0.85, 2.4
 
 
 @drawing()
 def validation_chart(validation: Validation) -> Figure:
-    """Draw predicted against measured J, and the first grasps of each order.
+    """Draw predicted against measured J, the reliability of probabilities, and orders.
 
     Parameters
     ----------
@@ -53,11 +54,14 @@ def validation_chart(validation: Validation) -> Figure:
     """
     groups = validation.groups[:MAX_GROUPS]
     width = max(2.6, 1.15 * len(groups))
-    figure = new_figure(LEFT + SIDE + GAP + width + 0.25, BOTTOM + SIDE + 0.95)
+    place = LEFT + SIDE + GAP + DIAGRAM + GAP
+    figure = new_figure(place + width + 0.25, BOTTOM + SIDE + 0.95)
     put_title(figure, LEFT, _title(validation), _subtitle(validation))
     _draw_costs(axes_at(figure, LEFT, BOTTOM, SIDE, SIDE), validation.lists)
-    bars = axes_at(figure, LEFT + SIDE + GAP, BOTTOM, width, SIDE)
+    bars = axes_at(figure, place, BOTTOM, width, SIDE)
     _draw_groups(bars, groups, validation.top)
+    diagram = axes_at(figure, LEFT + SIDE + GAP, BOTTOM, DIAGRAM, SIDE)
+    _draw_diagram(diagram, validation.diagram)
     if len(validation.groups) > MAX_GROUPS:
         said = f"first {MAX_GROUPS} of {len(validation.groups)} groups"
         bars.set_title(said, loc="right", fontsize=7.4, color=MUTED)
@@ -136,6 +140,29 @@ def _cost_legend(axes: Axes, lists: Sequence[JudgedList]) -> None:
         ncols=min(len(handles), 3), labelcolor=MUTED, columnspacing=1.0,
         handletextpad=0.2,
     )  # fmt: skip
+
+
+def _draw_diagram(axes: Axes, diagram: ReliabilityDiagram) -> None:
+    """Reliability diagram: frequency with its interval over predicted probability."""
+    axes.plot([0.0, 1.0], [0.0, 1.0], color=RULE, linewidth=0.8, zorder=1)
+    for one in diagram.bins:
+        hit = one.reached
+        axes.plot(
+            [one.predicted] * 2, [hit.low, hit.high], color=MUTED, linewidth=1.0,
+            zorder=2,
+        )  # fmt: skip
+        axes.scatter(
+            one.predicted, hit.share, s=8.0 + 90.0 * hit.total / diagram.grasps,
+            color=LIST_COLOURS[0], linewidths=0.0, zorder=3, clip_on=False,
+        )  # fmt: skip
+    axes.set_xlim(0.0, 1.0)
+    axes.set_ylim(0.0, 1.0)
+    axes.set_xlabel("predicted probability")
+    axes.set_ylabel("share reached (95 % interval)")
+    axes.spines[["top", "right"]].set_visible(False)
+    if diagram.grasps:
+        said = f"calibration error {diagram.error:.3f}"
+        axes.set_title(said, loc="left", fontsize=7.4, color=MUTED)
 
 
 def _draw_groups(axes: Axes, groups: Sequence[GroupSummary], top: int) -> None:

@@ -23,6 +23,7 @@ from reachmap.ranking.answers.ranked_list import (
 )
 from reachmap.ranking.lists.arrays import GraspList
 from reachmap.ranking.lists.reading import STDIN, read_grasps
+from reachmap.ranking.lookup.calibration import usual_calibration
 from reachmap.ranking.lookup.ranker import Ranker
 from reachmap.ranking.lookup.settings import CostBasis, RankSettings
 
@@ -185,10 +186,20 @@ def _check_request(
             raise SettingsError(f"{name} must be 1 or more (got {value})")
 
 
-def ranker_of(bin_map: BinMap, map_path: str | Path, basis: CostBasis | None) -> Ranker:
-    """Make a ranker; what it cannot take from the map as asked is logged."""
+def ranker_of(
+    bin_map: BinMap,
+    map_path: str | Path,
+    basis: CostBasis | None,
+    *,
+    calibrated: bool = True,
+) -> Ranker:
+    """Make a ranker; what it cannot take from the map as asked is logged.
+
+    Unless told otherwise it has the calibration beside the map.
+    """
     basis = basis or CostBasis()
-    ranker = Ranker(bin_map, basis)
+    known = usual_calibration(map_path, bin_map.stamp) if calibrated else None
+    ranker = Ranker(bin_map, basis, known)
     if ranker.table.basis != basis:
         logger.warning(
             "%s: has no counts of state checks (format %s), so that planning times are "

@@ -10,6 +10,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from reachmap.core.scene import Scene
 from reachmap.errors import GraspListError, SettingsError
 from reachmap.maps import read_bin_map
@@ -18,6 +20,7 @@ from reachmap.maps.records import BinMap
 from reachmap.ranking.answers.pipeline import pose_from_numbers, rank_list
 from reachmap.ranking.answers.ranked_list import RankedList
 from reachmap.ranking.lists.reading import STDIN
+from reachmap.ranking.lookup.calibration import calibration_beside
 from reachmap.ranking.lookup.ranker import Ranker
 from reachmap.ranking.lookup.settings import CostBasis, RankSettings
 from reachmap.runtime.options import IN_PROCESS, RunOptions
@@ -26,6 +29,7 @@ from reachmap.sampling.frames import approach_distance_m
 from reachmap.tools.options import cell_of_artefact
 from reachmap.tools.prologue import refuse_cell_files
 from reachmap.tools.rank import ListFormat, ranker_of, read_list
+from reachmap.validation.calibration import calibrate as fit_calibration
 from reachmap.validation.facts import facts_of
 from reachmap.validation.judgement import judge_list
 from reachmap.validation.picks import NO_PICKS, join_picks, picks_of
@@ -89,6 +93,7 @@ def validate(
     top: int = 10,
     output: Path | None = None,
     chart: Path | None = None,
+    calibrate: bool = False,
     run: RunOptions = IN_PROCESS,
 ) -> ValidateAnswer:
     """Rank grasps with a map, plan to each of them, and compare.
@@ -111,6 +116,9 @@ def validate(
         A JSON file of the summary and every grasp.
     chart : Path, optional
         A picture (.png or .svg).
+    calibrate : bool
+        Keep a calibration beside the map, which gives every later ranking with it
+        calibrated probabilities.
     run : RunOptions
         Its shard and restart do not apply.
 
@@ -122,11 +130,15 @@ def validate(
     settings, pick = settings or RankSettings(), pick or PickOptions()
     _check_request(sources, random, pick, top)
     check_picture(chart, "--chart")
-    check_outputs([output, chart], overwrite=run.overwrite, inputs=[map_path, *sources])
+    calibration = calibration_beside(map_path) if calibrate else None
+    outputs = [output, chart, calibration]
+    check_outputs(outputs, overwrite=run.overwrite, inputs=[map_path, *sources])
     bin_map = read_bin_map(Path(map_path))
-    ranker = ranker_of(bin_map, map_path, basis)
     context = _context(bin_map, str(map_path), pick)
-    refuse_cell_files([output, chart], context.loaded)
+    refuse_cell_files(outputs, context.loaded)
+    if calibrate:
+        _check_calibration(map_path, context, pick)
+    ranker = ranker_of(bin_map, map_path, basis, calibrated=not calibrate)
     ranked = [
         _rank(source, ranker, settings, list_format or ListFormat())
         for source in sources
@@ -158,6 +170,8 @@ def validate(
             **dataclasses.asdict(ranker.table.basis),
         },
     )
+    if calibration is not None:
+        _calibrate(validation, calibration, overwrite=run.overwrite)
     _write(validation, output, chart, scene.checker.body_pairs, run.overwrite)
     return ValidateAnswer(
         validation=validation,
@@ -207,6 +221,45 @@ def _check_request(
             raise SettingsError(f"{name} must be 1 to {most} (got {value})")
     if top < 1:
         raise SettingsError(f"top must be 1 or more (got {top})")
+
+
+def _check_calibration(
+    map_path: str | Path, context: PickContext, pick: PickOptions
+) -> None:
+    """Refuse to calibrate with another cell than the map's."""
+    if pick.overrides:
+        raise SettingsError(
+            "--calibrate: plans in the cell of the map; leave out --set"
+        )
+    if context.loaded.cell.bin_scan.is_filled:
+        raise SettingsError(
+            f"--calibrate: {map_path} was scanned at levels of filling, and grasps are "
+            "planned to in the empty bin"
+        )
+
+
+def _calibrate(validation: Validation, path: Path, *, overwrite: bool) -> None:
+    said = validation.settings
+    names = ("planner", "rolls", "repeats", "seed", "roll")
+    found = fit_calibration(
+        str(said["map_sha256"]),
+        np.concatenate([one.share for one in validation.lists]),
+        np.concatenate([one.reached for one in validation.lists]),
+        {
+            "lists": [one.label for one in validation.lists],
+            **{name: said[name] for name in names},
+        },
+    )
+    text = json.dumps(found.document(), indent=1, allow_nan=False)
+    publish(path, [text.encode("ascii"), b"\n"], overwrite=overwrite)
+    logger.warning(
+        "%s: %d grasps, %d reached; calibration error %.3f, each grasp judged by the "
+        "others",
+        path,
+        found.grasps,
+        found.reached,
+        found.error,
+    )
 
 
 def _labels(ranked: Sequence[RankedList]) -> list[str]:

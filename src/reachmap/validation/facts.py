@@ -43,6 +43,7 @@ def facts_of(
             name: dataclasses.asdict(found)
             for name, found in validation.reliability.items()
         },
+        "reliability_diagram": dataclasses.asdict(validation.diagram),
     }
     if body_pairs is not None:
         facts["grasps"] = [
@@ -98,6 +99,7 @@ def _grasp_facts(
         "predicted": {
             "status": status_name(one.predicted_status[row]),
             "cost": one.predicted_cost[row],
+            "probability": one.probability[row],
         },
         "measured": {
             "status": status_name(results.status[row]),

@@ -35,6 +35,10 @@ class JudgedList:
     predicted_cost : array, shape (n,)
         J by the map; inf where it calls the grasp unreachable or says nothing.
     predicted_status : uint8 array, shape (n,)
+    share : array, shape (n,)
+        Share reached around each grasp; NaN where the map says nothing.
+    probability : array, shape (n,)
+        Predicted probability of being reached; NaN where the map says nothing.
     outside : bool array, shape (n,)
         Grasps that the map says nothing about.
     results : PickResults
@@ -53,6 +57,8 @@ class JudgedList:
     groups: Mapping[str, IntArray]
     predicted_cost: FloatArray
     predicted_status: CodeArray
+    share: FloatArray
+    probability: FloatArray
     outside: BoolArray
     results: PickResults
     measured: FloatArray
@@ -113,6 +119,12 @@ def judge_list(
         groups=_groups(ranked, ranker),
         predicted_cost=ranking.cost.copy(),
         predicted_status=ranking.status.copy(),
+        share=np.where(
+            np.isnan(ranking.probability),
+            np.nan,
+            ranker.surroundings.share_reached(ranked.queries),
+        ),
+        probability=ranking.probability.copy(),
         outside=outside,
         results=results,
         measured=mean,

@@ -11,6 +11,7 @@ import numpy as np
 from reachmap._typing import FloatArray, IntArray
 from reachmap.maps.summary.reliability import Reliability, reliability_of
 from reachmap.scans.measured import MEASURED
+from reachmap.validation.calibration import ReliabilityDiagram, reliability_diagram
 from reachmap.validation.judgement import ORDERS, JudgedList
 from reachmap.validation.statistics import (
     Confusion,
@@ -117,6 +118,8 @@ class Validation:
     reliability : mapping of str to Reliability
         Of a single attempt's path length, state checks, CPU and execution time: what
         share of the variance is the grasp and not luck.
+    diagram : ReliabilityDiagram
+        Predicted probabilities beside what became of the grasps.
     """
 
     settings: Mapping[str, Any]
@@ -125,6 +128,7 @@ class Validation:
     summaries: tuple[ListSummary, ...]
     groups: tuple[GroupSummary, ...]
     reliability: Mapping[str, Reliability]
+    diagram: ReliabilityDiagram
 
     @property
     def overall(self) -> ListSummary:
@@ -151,6 +155,10 @@ def summarise(
         summaries=tuple(summaries),
         groups=tuple(groups),
         reliability=_reliability(lists),
+        diagram=reliability_diagram(
+            np.concatenate([one.probability for one in lists]),
+            np.concatenate([one.reached for one in lists]),
+        ),
     )
 
 

@@ -76,6 +76,7 @@ def explanation(ranked: RankedList, row: int, ranker: Ranker, bin_map: BinMap) -
         parts += [
             ("attempts", _attempts_line(ranked, row, ranker, bin_map)),
             ("cost", _cost_line(ranked, row)),
+            ("probability", _probability_line(ranked, row)),
             *(("tie", line) for line in _tie_lines(ranked, row, ranker, bin_map)),
         ]
     return "\n".join(f"  {name:<10}  {text}" if name else text for name, text in parts)
@@ -165,6 +166,11 @@ def _cost_line(ranked: RankedList, row: int) -> str:
     )
     tool = _vector(ranking.orientation_wxyz[row], 4)
     return f"J = {ranking.cost[row]:.3f} = {parts}; tool orientation wxyz {tool}"
+
+
+def _probability_line(ranked: RankedList, row: int) -> str:
+    basis = "calibrated" if ranked.header["calibration"] else "share reached around"
+    return f"{ranked.ranking.probability[row]:.3f} ({basis})"
 
 
 def _tie_lines(

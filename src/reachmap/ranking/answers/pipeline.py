@@ -83,6 +83,7 @@ def _header(ranker: Ranker, settings: RankSettings) -> Mapping[str, Any]:
         "map_sha256": ranker.stamp.content_sha256,
         "cost_table_sha256": ranker.cost_table_sha256,
         "cell_sha256": ranker.stamp.cell_sha256,
+        "calibration": _calibration_facts(ranker),
         "weights": list(settings.weights),
         "likeness": settings.likeness,
         **({"margins": dict(settings.margins)} if settings.margins else {}),
@@ -94,6 +95,13 @@ def _header(ranker: Ranker, settings: RankSettings) -> Mapping[str, Any]:
         "scale": scale,
         "maxima": maxima,
     }
+
+
+def _calibration_facts(ranker: Ranker) -> Mapping[str, Any] | None:
+    known = ranker.calibration
+    if known is None:
+        return None
+    return {"grasps": known.grasps, "error": known.error}
 
 
 def pose_from_numbers(values: Sequence[float]) -> FloatArray:

@@ -132,6 +132,7 @@ def _results(ranked: RankedList) -> list[dict[str, Any]]:
         ranking.distance.tolist(),
         ranking.angle.tolist(),
         ranking.orientation_wxyz.tolist(),
+        ranking.probability.tolist(),
         ranking.extrapolated.tolist(),
         strict=True,
     )
@@ -142,7 +143,8 @@ def _results(ranked: RankedList) -> list[dict[str, Any]]:
 def _result(
     supplied: int, names: tuple[str, ...], values: tuple[Any, ...]
 ) -> dict[str, Any]:
-    rank, after, before, cost, terms, code, test_grasp, phi1, phi2, wxyz, far = values
+    rank, after, before, cost, terms, code, test_grasp, *rest = values
+    phi1, phi2, wxyz, probability, far = rest
     reachable = bool(np.isfinite(cost))
     inside = code not in (OUTSIDE_MAP, INVALID)
     quadrant = {"quadrant_rank": after, "original_quadrant_rank": before}
@@ -153,6 +155,7 @@ def _result(
         **(quadrant if after is not None else {}),
         "cost": cost if reachable else None,
         "terms": named if reachable else None,
+        "probability": probability if np.isfinite(probability) else None,
         "status": status_name(code),
         "test_grasp": test_grasp[1:] if inside else None,
         "layer": test_grasp[0] if inside else None,

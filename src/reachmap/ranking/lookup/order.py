@@ -50,6 +50,9 @@ class Ranking:
     roll_free : bool array, shape (n,)
     extrapolated : bool array, shape (n,)
         Beyond the outermost test points, where the map continues what it knows.
+    probability : array, shape (n,)
+        That planning reaches the grasp: calibrated where the ranker has a calibration,
+        else the share reached around it; NaN where the map says nothing.
     orientation_wxyz : array, shape (n, 4)
         The tool orientation to use, in robot_base: R_test of the test grasp, turned
         about the approach by the roll that its best path takes, where roll is free.
@@ -65,6 +68,7 @@ class Ranking:
     angle: FloatArray
     roll_free: BoolArray
     extrapolated: BoolArray
+    probability: FloatArray
     orientation_wxyz: FloatArray
 
     def __post_init__(self) -> None:

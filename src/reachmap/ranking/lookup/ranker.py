@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from reachmap._typing import FloatArray, IntArray
-from reachmap.errors import SettingsError
+from reachmap.errors import MapFileError, SettingsError
 from reachmap.maps.format.bin import read_bin_map
 from reachmap.maps.records import BinMap, Stamp
+from reachmap.ranking.lookup.calibration import Calibration, usual_calibration
 from reachmap.ranking.lookup.columns import LIKENESS, Columns, columns_of
 from reachmap.ranking.lookup.costs import (
     beyond_points,
@@ -41,6 +42,7 @@ from reachmap.ranking.lookup.queries import (
     rotations_from_quaternions,
 )
 from reachmap.ranking.lookup.settings import CostBasis, Invalid, RankSettings, Roll
+from reachmap.ranking.lookup.surroundings import Surroundings
 from reachmap.ranking.lookup.table import GraspTable, table_from_bin_map
 
 
@@ -55,6 +57,13 @@ class Ranker:
     bin_map : BinMap
     basis : CostBasis, optional
         What the terms of J are made of.
+    calibration : Calibration, optional
+        What turns the share reached around a grasp into its probability.
+
+    Raises
+    ------
+    MapFileError
+        The calibration is another map's.
 
     Attributes
     ----------
@@ -64,10 +73,22 @@ class Ranker:
         Frames that grasp lists may be in, as poses in robot_base.
     stamp : Stamp
         Identity of the map.
+    calibration : Calibration or None
+    surroundings : Surroundings
+        Share reached around any grasp.
     """
 
-    def __init__(self, bin_map: BinMap, basis: CostBasis | None = None) -> None:
+    def __init__(
+        self,
+        bin_map: BinMap,
+        basis: CostBasis | None = None,
+        calibration: Calibration | None = None,
+    ) -> None:
+        if calibration and calibration.map_sha256 != bin_map.stamp.content_sha256:
+            raise MapFileError("the calibration was made for another map")
+        self.calibration = calibration
         self.table: GraspTable = table_from_bin_map(bin_map, basis)
+        self.surroundings = Surroundings(self.table)
         self.frames: Mapping[str, FloatArray] = frames_of(bin_map)
         self.stamp: Stamp = bin_map.stamp
         self._tree = NearestPoints(self.table.points)
@@ -79,14 +100,17 @@ class Ranker:
 
     @classmethod
     def from_map(cls, path: str | Path, basis: CostBasis | None = None) -> Ranker:
-        """Load a bin map.
+        """Load a bin map, and the calibration beside it if there is one.
+
+        A calibration of another map is passed over with a warning.
 
         Raises
         ------
         MapFileError
-            The file is not a readable bin map.
+            The file is not a readable bin map, or its calibration is damaged.
         """
-        return cls(read_bin_map(Path(path)), basis)
+        bin_map = read_bin_map(Path(path))
+        return cls(bin_map, basis, usual_calibration(path, bin_map.stamp))
 
     def rank(
         self,
@@ -197,9 +221,14 @@ class Ranker:
             angle=np.where(valid, matches.angle, np.nan),
             roll_free=queries.free.copy(),
             extrapolated=valid & ~outside & beyond_points(queries.points, table),
+            probability=np.where(matched, self._probability(queries), np.nan),
             orientation_wxyz=table.recommended[matches.point, matches.orientation]
             + 0.0,
         )
+
+    def _probability(self, queries: Queries) -> FloatArray:
+        share = self.surroundings.share_reached(queries)
+        return share if self.calibration is None else self.calibration(share)
 
     def tied(self, query: Queries) -> tuple[IntArray, IntArray]:
         """Points and orientations of the test grasps that tie for one grasp."""
