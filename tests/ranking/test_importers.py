@@ -151,7 +151,9 @@ def test_pickles_are_refused(tmp_path):
         (lambda data: data.replace(b"(3, 17)", b"(9999999999, 17)"), "complete array"),
         (lambda data: data.replace(b"(3, 17)", b"(-3, 17)"), "complete array"),
         (lambda data: data.replace(b"(3, 17)", b"(3, 'a')"), "not a readable .npy"),
-        (lambda data: data.replace(b"<f4", b"<c4"), "complete array of numbers"),
+        (lambda data: data.replace(b"(3, 17)", b"(-1,-51)"), "complete array"),
+        (lambda data: data.replace(b"<f4", b"<c8"), "complete array of numbers"),
+        (lambda data: data.replace(b"<f4", b"<c4"), "not a readable .npy"),
         (lambda data: data.replace(b"{'descr'", b"['descr'"), "not a readable .npy"),
     ],
 )

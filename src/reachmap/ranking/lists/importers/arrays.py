@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import ast
 import io
 import math
-import re
+import warnings
 import zipfile
 from typing import Any, Final
 
 import numpy as np
+import numpy.lib.format as npy
 
 from reachmap._typing import FloatArray
 from reachmap.errors import GraspListError
@@ -20,15 +20,13 @@ MAX_NPZ_BYTES: Final = 32 * 2**20
 GRASPNET_COLUMNS: Final = 17
 SUCTION_COLUMNS: Final = 7
 MAX_VALUE: Final = 1e9
-_NPY_START: Final = re.compile(rb"\x93NUMPY(?P<version>[\x01\x02])\x00", re.DOTALL)
-_NUMBERS: Final = re.compile(r"[<>|](f[48]|[iu][1248])")
 
 
 def array_from_npy(data: bytes, source: str) -> FloatArray:
     """Rows of a ``.npy`` file.
 
-    The header is read here rather than by :func:`numpy.load`: nothing is unpickled,
-    and the size is compared with the file before anything is allocated.
+    Nothing is unpickled, and the size that the header claims is compared with the
+    file before anything is allocated.
 
     Parameters
     ----------
@@ -41,25 +39,27 @@ def array_from_npy(data: bytes, source: str) -> FloatArray:
     array, shape (n, columns)
         A single row may be stored flat.
     """
-    match = _NPY_START.match(data)
-    width = {1: 2, 2: 4}.get(match["version"][0], 0) if match else 0
-    start = 8 + width
-    size = int.from_bytes(data[8:start], "little")
+    stream = io.BytesIO(data)
     try:
-        header = ast.literal_eval(data[start : start + min(size, 4096)].decode("ascii"))
-        descr, columns_first = str(header["descr"]), bool(header["fortran_order"])
-        shape = tuple(int(n) for n in header["shape"])
-    except (ValueError, SyntaxError, TypeError, KeyError, MemoryError, RecursionError):
+        is_first = npy.read_magic(stream) == (1, 0)
+        read = npy.read_array_header_1_0 if is_first else npy.read_array_header_2_0
+        with warnings.catch_warnings(action="ignore"):  # headers as Python 2 wrote them
+            shape, _, dtype = read(stream)
+    except Exception:
+        # On damaged headers NumPy raises whatever its parsers raise.
         raise GraspListError(f"{source}: not a readable .npy file") from None
-    body = data[start + size :]
-    if not _NUMBERS.fullmatch(descr) or len(body) != math.prod(shape) * int(descr[2:]):
+    size = len(data) - stream.tell()
+    if (
+        dtype.kind not in "fiu"
+        or min(shape, default=0) < 0
+        or size != math.prod(shape) * dtype.itemsize
+    ):
         raise GraspListError(
             f"{source}: expected a complete array of numbers "
-            f"(got {descr!a} {shape} in {len(data)} bytes)"
+            f"(got {dtype.str!a} {shape} in {len(data)} bytes)"
         )
-    flat = np.frombuffer(body, dtype=descr).astype(float)
-    by_rows = flat.reshape(shape[::-1]).T if columns_first else flat.reshape(shape)
-    return _checked(np.atleast_2d(by_rows), source)
+    rows = np.load(io.BytesIO(data), allow_pickle=False).astype(float)
+    return _checked(np.atleast_2d(rows), source)
 
 
 def array_from_npz(data: bytes, source: str) -> FloatArray:
