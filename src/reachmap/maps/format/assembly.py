@@ -263,6 +263,15 @@ def sections_of(layout: Layout, tree: Tree) -> dict[str, Any]:
     return fields
 
 
+def origin_of(tree: Tree, path: Path) -> dict[str, Any]:
+    """Fields of a record that say where it comes from."""
+    return {
+        "stamp": stamp_of(tree),
+        "provenance": provenance_of(tree, path),
+        "run": run_of(tree, path),
+    }
+
+
 def stamp_of(tree: Tree) -> Stamp:
     """Collect the root attributes of a checked tree."""
     return Stamp(

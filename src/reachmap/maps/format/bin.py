@@ -10,11 +10,9 @@ from reachmap.geometry import AXES
 from reachmap.maps.bytes.tree import Tree
 from reachmap.maps.format.assembly import (
     assemble,
-    provenance_of,
-    run_of,
+    origin_of,
     section_arrays,
     sections_of,
-    stamp_of,
 )
 from reachmap.maps.format.bin_checks import check_bin
 from reachmap.maps.format.layout import (
@@ -30,7 +28,7 @@ from reachmap.maps.format.layout import (
     outcome,
 )
 from reachmap.maps.format.sections import BIN_SECTIONS
-from reachmap.maps.format.store import load, store
+from reachmap.maps.format.store import RecordFile
 from reachmap.maps.records import BinMap, PathStore
 from reachmap.maps.summary.directions import reachability_of_directions
 
@@ -210,32 +208,6 @@ _ARRAYS = tuple(
 _PATHS = ("configuration", "row_size", "planned_size", "index")
 
 
-def write_bin_map(path: Path, record: BinMap, overwrite: bool = False) -> str:
-    """Write a bin map.
-
-    Parameters
-    ----------
-    path : Path
-    record : BinMap
-        Its ``stamp.content_sha256`` is not used: it is computed from the numbers.
-    overwrite : bool
-        Whether an existing file may be replaced.
-
-    Returns
-    -------
-    str
-        ``content_sha256``.
-
-    Raises
-    ------
-    OutputError
-        The file exists, or nothing can be written there.
-    EngineError
-        The record breaks the format.
-    """
-    return store(path, tree_from_bin_map(record), BIN, overwrite=overwrite)
-
-
 def tree_from_bin_map(record: BinMap) -> Tree:
     """Everything that the file will hold."""
     arrays: dict[str, Any] = {name: getattr(record, name) for name in _ARRAYS}
@@ -266,18 +238,6 @@ def tree_from_bin_map(record: BinMap) -> Tree:
     )
 
 
-def read_bin_map(path: Path) -> BinMap:
-    """Read a bin map; everything about it is checked.
-
-    Raises
-    ------
-    MapFileError
-        The file is missing, damaged, or something else.
-    """
-    tree, _ = load(path, BIN)
-    return bin_map_from_tree(tree, path)
-
-
 def bin_map_from_tree(tree: Tree, path: Path) -> BinMap:
     """Turn a checked tree into a record; ``path`` is named in messages."""
     sections = sections_of(BIN, tree)
@@ -291,8 +251,10 @@ def bin_map_from_tree(tree: Tree, path: Path) -> BinMap:
         joint_names=tuple(tree.attributes["joint_names"]),
         body_pairs=tuple(tree.attributes["body_pairs"]),
         paths=PathStore(**paths, stage=stage),
-        stamp=stamp_of(tree),
-        provenance=provenance_of(tree, path),
-        run=run_of(tree, path),
+        **origin_of(tree, path),
         **sections,
     )
+
+
+_FILE = RecordFile(layout=BIN, to_tree=tree_from_bin_map, from_tree=bin_map_from_tree)
+write_bin_map, read_bin_map = _FILE.write, _FILE.read

@@ -11,16 +11,14 @@ import numpy as np
 from reachmap.maps.bytes.tree import Tree
 from reachmap.maps.format.assembly import (
     assemble,
-    provenance_of,
-    run_of,
+    origin_of,
     section_arrays,
     sections_of,
-    stamp_of,
 )
 from reachmap.maps.format.checks import check_pose, check_world, require
 from reachmap.maps.format.layout import JOINT, PERCENT, SCAN, Layout, Variable, index
 from reachmap.maps.format.sections import PLACEMENT_SECTIONS
-from reachmap.maps.format.store import load, store
+from reachmap.maps.format.store import RecordFile
 from reachmap.maps.records import BinPlacement
 
 
@@ -175,32 +173,6 @@ _ARRAYS = (
 _ROWS = ("chosen", "runner_up", "paper_choice")
 
 
-def write_placement(path: Path, record: BinPlacement, overwrite: bool = False) -> str:
-    """Write a bin placement.
-
-    Parameters
-    ----------
-    path : Path
-    record : BinPlacement
-        Its ``stamp.content_sha256`` is not used: it is computed from the numbers.
-    overwrite : bool
-        Whether an existing file may be replaced.
-
-    Returns
-    -------
-    str
-        ``content_sha256``.
-
-    Raises
-    ------
-    OutputError
-        The file exists, or nothing can be written there.
-    EngineError
-        The record breaks the format.
-    """
-    return store(path, tree_from_placement(record), PLACEMENT, overwrite=overwrite)
-
-
 def tree_from_placement(record: BinPlacement) -> Tree:
     """Everything that the file will hold."""
     reasons = ("", *sorted(set(record.reason) - {""}))
@@ -246,18 +218,6 @@ def is_turn(direction: str) -> bool:
     return direction.lstrip("+-") in ("roll", "pitch", "yaw")
 
 
-def read_placement(path: Path) -> BinPlacement:
-    """Read a bin placement; everything about it is checked.
-
-    Raises
-    ------
-    MapFileError
-        The file is missing, damaged, or something else.
-    """
-    tree, _ = load(path, PLACEMENT)
-    return placement_from_tree(tree, path)
-
-
 def placement_from_tree(tree: Tree, path: Path) -> BinPlacement:
     """Turn a checked tree into a record; ``path`` is named in messages."""
     reasons = tree.attributes["reasons"]
@@ -275,9 +235,7 @@ def placement_from_tree(tree: Tree, path: Path) -> BinPlacement:
         reason=tuple(str(reasons[code]) for code in tree.array("reason")),
         margin={**_margin(tree, "shift"), **_margin(tree, "turn")},
         joint_names=tuple(tree.attributes["joint_names"]),
-        stamp=stamp_of(tree),
-        provenance=provenance_of(tree, path),
-        run=run_of(tree, path),
+        **origin_of(tree, path),
         support=tree.text("support") if "support" in tree.leaves else None,
         **optional,
     )
@@ -287,3 +245,9 @@ def _margin(tree: Tree, name: str) -> Mapping[str, float]:
     directions = tree.leaves[name].attributes[f"{name}_directions"]
     values = tree.array(f"{name}_margin").tolist()
     return dict(zip(directions, values, strict=True))
+
+
+_FILE = RecordFile(
+    layout=PLACEMENT, to_tree=tree_from_placement, from_tree=placement_from_tree
+)
+write_placement, read_placement = _FILE.write, _FILE.read

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Generic, TypeVar
 
 from reachmap.errors import EngineError, MapFileError, ReachmapError
 from reachmap.maps.bytes.hashing import content_sha256, integrity_sha256
@@ -40,6 +42,62 @@ OPEN_ELSEWHERE = (
 )
 MAX_PROBLEMS = 8
 """Mistakes of one file that are listed before the rest is only counted."""
+
+Record = TypeVar("Record")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RecordFile(Generic[Record]):
+    """Records of one kind as files.
+
+    Parameters
+    ----------
+    layout : Layout
+    to_tree : callable
+        Everything that the file of a record holds.
+    from_tree : callable
+        The record of a checked tree; the path is named in messages.
+    """
+
+    layout: Layout
+    to_tree: Callable[[Record], Tree]
+    from_tree: Callable[[Tree, Path], Record]
+
+    def write(self, path: Path, record: Record, overwrite: bool = False) -> str:
+        """Write a record.
+
+        Parameters
+        ----------
+        path : Path
+        record : WorkspaceMap, BinMap, BinPlacement, …
+            Its ``stamp.content_sha256`` is not used: it is computed from the numbers.
+        overwrite : bool
+            Whether an existing file may be replaced.
+
+        Returns
+        -------
+        str
+            ``content_sha256``.
+
+        Raises
+        ------
+        OutputError
+            The file exists, or nothing can be written there.
+        EngineError
+            The record breaks the format.
+        """
+        return store(path, self.to_tree(record), self.layout, overwrite=overwrite)
+
+    def read(self, path: Path) -> Record:
+        """Read a record; everything about it is checked.
+
+        Raises
+        ------
+        MapFileError
+            The file is missing, damaged, or something else.
+        """
+        tree, _ = load(path, self.layout)
+        return self.from_tree(tree, path)
 
 
 def store(path: Path, tree: Tree, layout: Layout, *, overwrite: bool = False) -> str:

@@ -11,11 +11,9 @@ import numpy as np
 from reachmap.maps.bytes.tree import Tree
 from reachmap.maps.format.assembly import (
     assemble,
-    provenance_of,
-    run_of,
+    origin_of,
     section_arrays,
     sections_of,
-    stamp_of,
 )
 from reachmap.maps.format.checks import (
     check_components,
@@ -40,7 +38,7 @@ from reachmap.maps.format.layout import (
     outcome,
 )
 from reachmap.maps.format.sections import WORKSPACE_SECTIONS
-from reachmap.maps.format.store import load, store
+from reachmap.maps.format.store import RecordFile
 from reachmap.maps.records import (
     KINDS,
     CubeMap,
@@ -239,34 +237,6 @@ _STITCHED = (
 _CUBE_FIELDS = tuple(item.name for item in dataclasses.fields(CubeMap))
 
 
-def write_workspace_map(
-    path: Path, record: WorkspaceMap, overwrite: bool = False
-) -> str:
-    """Write a workspace map.
-
-    Parameters
-    ----------
-    path : Path
-    record : WorkspaceMap
-        Its ``stamp.content_sha256`` is not used: it is computed from the numbers.
-    overwrite : bool
-        Whether an existing file may be replaced.
-
-    Returns
-    -------
-    str
-        ``content_sha256``.
-
-    Raises
-    ------
-    OutputError
-        The file exists, or nothing can be written there.
-    EngineError
-        The record breaks the format.
-    """
-    return store(path, tree_from_workspace_map(record), WORKSPACE, overwrite=overwrite)
-
-
 def tree_from_workspace_map(record: WorkspaceMap) -> Tree:
     """Everything that the file will hold."""
     arrays: dict[str, Any] = {name: getattr(record, name) for name in _STITCHED}
@@ -294,18 +264,6 @@ def tree_from_workspace_map(record: WorkspaceMap) -> Tree:
     )
 
 
-def read_workspace_map(path: Path) -> WorkspaceMap:
-    """Read a workspace map; everything about it is checked.
-
-    Raises
-    ------
-    MapFileError
-        The file is missing, damaged, or something else.
-    """
-    tree, _ = load(path, WORKSPACE)
-    return workspace_map_from_tree(tree, path)
-
-
 def workspace_map_from_tree(tree: Tree, path: Path) -> WorkspaceMap:
     """Turn a checked tree into a record; ``path`` is named in messages."""
     arrays: dict[str, Any] = {name: tree.array(name) for name in _STITCHED}
@@ -315,8 +273,12 @@ def workspace_map_from_tree(tree: Tree, path: Path) -> WorkspaceMap:
         joint_names=tuple(tree.attributes["joint_names"]),
         body_pairs=tuple(tree.attributes["body_pairs"]),
         method=str(tree.attributes["method"]),
-        stamp=stamp_of(tree),
-        provenance=provenance_of(tree, path),
-        run=run_of(tree, path),
+        **origin_of(tree, path),
         **sections_of(WORKSPACE, tree),
     )
+
+
+_FILE = RecordFile(
+    layout=WORKSPACE, to_tree=tree_from_workspace_map, from_tree=workspace_map_from_tree
+)
+write_workspace_map, read_workspace_map = _FILE.write, _FILE.read

@@ -9,10 +9,10 @@ import numpy as np
 
 from reachmap.maps.bytes.tree import Tree
 from reachmap.maps.comparison.significance import benjamini_hochberg
-from reachmap.maps.format.assembly import assemble, provenance_of, run_of, stamp_of
+from reachmap.maps.format.assembly import assemble, origin_of
 from reachmap.maps.format.checks import require
 from reachmap.maps.format.layout import Layout, Variable, index
-from reachmap.maps.format.store import load, store
+from reachmap.maps.format.store import RecordFile
 from reachmap.maps.study.record import PATH_LENGTH, STATES, Study, VariantStatus
 
 TEXTS: Final = {
@@ -165,11 +165,6 @@ _ARRAYS: Final = ("parameter", "status", "feasible", "significant", *NUMBERS, *C
 _PLAIN: Final = ("design", "bin_mode", "base", "best", "runner_up")
 
 
-def write_study(path: Path, record: Study, overwrite: bool = False) -> str:
-    """Write a study; see :func:`reachmap.maps.format.placement.write_placement`."""
-    return store(path, tree_from_study(record), STUDY, overwrite=overwrite)
-
-
 def tree_from_study(record: Study) -> Tree:
     """Everything that the file will hold."""
     arrays: dict[str, Any] = {name: getattr(record, name) for name in _ARRAYS}
@@ -185,18 +180,6 @@ def tree_from_study(record: Study) -> Tree:
     )
 
 
-def read_study(path: Path) -> Study:
-    """Read a study; everything about it is checked.
-
-    Raises
-    ------
-    MapFileError
-        The file is missing, damaged, or something else.
-    """
-    tree, _ = load(path, STUDY)
-    return study_from_tree(tree, path)
-
-
 def study_from_tree(tree: Tree, path: Path) -> Study:
     """Turn a checked tree into a record; ``path`` is named in messages."""
     fields: dict[str, Any] = {name: tree.array(name) for name in _ARRAYS}
@@ -205,7 +188,9 @@ def study_from_tree(tree: Tree, path: Path) -> Study:
     fields.update({name: tree.attributes[name] for name in _PLAIN})
     return Study(
         **fields,
-        stamp=stamp_of(tree),
-        provenance=provenance_of(tree, path),
-        run=run_of(tree, path),
+        **origin_of(tree, path),
     )
+
+
+_FILE = RecordFile(layout=STUDY, to_tree=tree_from_study, from_tree=study_from_tree)
+write_study, read_study = _FILE.write, _FILE.read
