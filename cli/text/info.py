@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from reachmap.maps.bytes.to_json import flat_json
 from reachmap.maps.format.placement import is_turn
 from reachmap.maps.records import Status
 from reachmap.maps.summary.bin import MEASURES, BinSummary, Spread
+from reachmap.maps.summary.clearance import ClearanceShare
 from reachmap.maps.summary.directions import ReachedShares
 from reachmap.maps.summary.emptying import Emptying
 from reachmap.maps.summary.evidence import EvidenceSummary
@@ -172,6 +173,7 @@ def _bin_lines(summary: BinSummary) -> list[str]:
         "",
         "Path reachability",
         *share_lines(summary.shares),
+        *_clearance_lines(summary.clearances),
         *_emptying_lines(summary.emptying),
         "",
         "Reached after n attempts (Wilson interval)",
@@ -203,6 +205,21 @@ def share_lines(shares: ReachedShares) -> list[str]:
     return table_lines(
         [[name, f"{percent_text(share)} %", said] for name, share, said in rows], "<><"
     )
+
+
+def _clearance_lines(shares: Sequence[ClearanceShare]) -> list[str]:
+    """What is left of the headline where paths must keep a distance."""
+    if not shares:
+        return []
+    rows = [
+        [f"{1000.0 * share.clearance_m:.0f} mm", f"{percent_text(share.frames)} %"]
+        for share in shares
+    ]
+    return [
+        "",
+        "Test grasps whose path keeps a clearance of",
+        *table_lines(rows, ">>"),
+    ]
 
 
 def _emptying_lines(emptying: Emptying | None) -> list[str]:

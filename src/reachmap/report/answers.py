@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from reachmap.maps.summary.clearance import clearance_shares
 from reachmap.maps.summary.directions import reached_shares
 from reachmap.maps.summary.emptying import emptying_of
 from reachmap.maps.summary.placement import summarise_placement
@@ -22,8 +23,15 @@ FIRST_PICKS = 3
 
 
 def headline_answers(run: RunFolder) -> list[Tile]:
-    """Tiles: best level, bin, share of test grasps, emptying, first picks."""
-    tiles = [_level(run), _bin(run), _share(run), _emptying(run), _picks(run)]
+    """Tiles: best level, bin, share of test grasps, room, emptying, first picks."""
+    tiles = [
+        _level(run),
+        _bin(run),
+        _share(run),
+        _clearance(run),
+        _emptying(run),
+        _picks(run),
+    ]
     return [tile for tile in tiles if tile is not None]
 
 
@@ -99,6 +107,24 @@ def _share(run: RunFolder) -> Tile:
         f"After one attempt: {percent(float(found.share[0]))}."
         if are_independent(run.bin_map)
         else "",
+    )
+
+
+def _clearance(run: RunFolder) -> Tile | None:
+    """What is left of the share where paths must keep a distance."""
+    shares = () if run.bin_map is None else clearance_shares(run.bin_map)
+    if not shares:
+        return None
+    steps = ", ".join(
+        f"{percent(share.frames)} keep {number(1000 * share.clearance_m, 0, 'mm')}"
+        for share in shares
+    )
+    middle = shares[len(shares) // 2]
+    room = number(1000 * middle.clearance_m, 0, "mm")
+    return _tile(
+        "How exactly must the cell be built?",
+        f"{percent(middle.frames)} with {room} to spare",
+        f"By the least distance of any two bodies on the way: {steps}.",
     )
 
 

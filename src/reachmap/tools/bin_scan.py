@@ -12,6 +12,7 @@ import numpy as np
 from reachmap.cell.loading import read_cell
 from reachmap.core.scene import Scene
 from reachmap.maps import BinMap, Status, read_placement, read_workspace_map
+from reachmap.maps.summary.clearance import clearance_shares
 from reachmap.runtime.job import Work
 from reachmap.runtime.options import IN_PROCESS, RunOptions
 from reachmap.runtime.run import run_scan
@@ -136,16 +137,23 @@ def load_placed_cell(
 
 
 def summary_of_bin(bin_map: BinMap | None) -> dict[str, Any]:
-    """Headline of a map: grasps, reachability after one and all attempts."""
+    """Headline of a map: grasps, reachability, and its share with more clearance."""
     if bin_map is None:
         return {}
     reachable = bin_map.status == Status.PATH_FOUND
     first = bin_map.path_found[..., 0] > 0
+    kept = {
+        f"path_reachability_at_{1000 * share.clearance_m:.0f}_mm_clearance_percent": (
+            round(share.frames, 2)
+        )
+        for share in clearance_shares(bin_map)
+    }
     return {
         "test_grasps": reachable.size,
         "plans": bin_map.path_found.size,
         "reachable_after_1_attempt_percent": round(100 * float(first.mean()), 2),
         "path_reachability_percent": round(100 * float(reachable.mean()), 2),
+        **kept,
     }
 
 

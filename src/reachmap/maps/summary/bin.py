@@ -8,6 +8,7 @@ import numpy as np
 
 from reachmap._typing import BoolArray, FloatArray
 from reachmap.maps.records import BinMap, Status
+from reachmap.maps.summary.clearance import ClearanceShare, clearance_shares
 from reachmap.maps.summary.directions import ReachedShares, reached_shares
 from reachmap.maps.summary.emptying import Emptying, emptying_of
 from reachmap.maps.summary.evidence import EvidenceSummary, evidence_of
@@ -130,6 +131,9 @@ class BinSummary:
         Behind ``no_path_found``; None where the map does not tell.
     emptying : Emptying or None
         Reachability by height; None with a single layer.
+    clearances : tuple of ClearanceShare
+        Test grasps by the clearance of their best path; empty where the map does not
+        tell.
     """
 
     grasps: int
@@ -147,6 +151,7 @@ class BinSummary:
     reliability: dict[str, Reliability]
     unreached: EvidenceSummary | None
     emptying: Emptying | None
+    clearances: tuple[ClearanceShare, ...]
 
 
 def summarise_bin(record: BinMap) -> BinSummary:
@@ -167,6 +172,7 @@ def summarise_bin(record: BinMap) -> BinSummary:
         reliability=term_reliability(record),
         unreached=_unreached(record),
         emptying=emptying_of(record),
+        clearances=clearance_shares(record),
     )
 
 
