@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from reachmap.cli.text.info import reliability_lines
+from reachmap.cli.text.bin_map import reliability_lines
 from reachmap.cli.text.tables import fact_lines, table_lines
 from reachmap.text import plural, printable
 from reachmap.validation.calibration import ReliabilityDiagram

@@ -7,12 +7,18 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from reachmap._typing import FloatArray, IntArray
+from reachmap._typing import BoolArray, FloatArray, IntArray
 from reachmap.core.collision.checker import CollisionChecker, guess_nothing
 
 TOLERANCE_M, TOLERANCE_SHARE = 1e-3, 0.1
 """By how much, or by what share of itself if that is more, a clearance may be greater
 than the least there is anywhere on the path. Half as much takes twice the time."""
+
+
+def certain_clearance_m(clearance_m: FloatArray) -> FloatArray:
+    """What a clearance that was measured on a path is not below anywhere on it [m]."""
+    allowed = np.maximum(TOLERANCE_M, TOLERANCE_SHARE * clearance_m)
+    return np.asarray(clearance_m - allowed)
 
 
 class ClearanceMeter:
@@ -38,7 +44,9 @@ class ClearanceMeter:
         pairs = self._bodies.collisionPairs
         self._has_mesh = np.array([self._differs(pair) for pair in pairs], bool)
 
-    def of_path(self, path: FloatArray) -> tuple[float, int]:
+    def of_path(
+        self, path: FloatArray, among: BoolArray | None = None
+    ) -> tuple[float, int]:
         """Least distance of two bodies on a path.
 
         The path is halved until what lies between two configurations cannot be
@@ -49,6 +57,8 @@ class ClearanceMeter:
         ----------
         path : array, shape (n, dof)
             Straight motions between its points [rad].
+        among : bool array, shape (pairs,), optional
+            Pairs of the checker's geometry to look at; default: all.
 
         Returns
         -------
@@ -58,11 +68,13 @@ class ClearanceMeter:
             Index into the checker's ``body_pairs``, -1 where there are none.
         """
         count = len(self._bodies.collisionPairs)
-        if count == 0:
+        pairs = np.arange(count) if among is None else np.flatnonzero(among)
+        if len(pairs) == 0:
             return float("nan"), -1
         self._least, self._pair = np.inf, -1
-        # The last way-point, at the grasp, is the narrowest as a rule.
-        d = self._distances(path[-1], np.arange(count), np.full(count, -np.inf))
+        # The last way-point, at the grasp, is the narrowest as a rule. Pairs that are
+        # not looked at are as far apart as can be.
+        d = self._distances(path[-1], pairs, np.full(count, np.inf))
         for k in range(len(path) - 1, 0, -1):
             known = d - self._moved(path[k - 1], path[k])
             d_before = self._distances(path[k - 1], self._near(known), known)
