@@ -14,10 +14,12 @@ from reachmap.cli.text.evidence import (
     evidence_text,
     verdict_text,
 )
+from reachmap.cli.text.robustness import robustness_lines
 from reachmap.cli.text.study import study_lines
 from reachmap.cli.text.tables import fact_lines, table_lines
 from reachmap.maps.bytes.to_json import flat_json
 from reachmap.maps.format.placement import is_turn
+from reachmap.maps.robustness.summary import RobustnessSummary
 from reachmap.maps.summary.bin import BinSummary
 from reachmap.maps.summary.placement import CandidateSummary, PlacementSummary
 from reachmap.maps.summary.statistics import (
@@ -41,6 +43,8 @@ def info_text(info: ArtefactInfo) -> str:
         body = bin_lines(summary)
     elif isinstance(summary, StudySummary):
         body = study_lines(summary)
+    elif isinstance(summary, RobustnessSummary):
+        body = robustness_lines(summary)
     else:
         body = _placement_lines(summary)
     lines = [_headline(info), *_approximation_lines(info), *body, "", "Made from"]

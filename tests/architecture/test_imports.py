@@ -22,7 +22,7 @@ LEVELS = {
     "maps": 4,
     "core": 5, "ranking": 5, "runtime": 5,
     "scans": 6,
-    "motions": 7, "placement": 7, "studies": 7, "validation": 7,
+    "motions": 7, "placement": 7, "robustness": 7, "studies": 7, "validation": 7,
     "plots": 8,
     "report": 9, "view": 9,
     "tools": 10,

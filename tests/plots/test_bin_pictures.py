@@ -22,10 +22,14 @@ from reachmap.plots.bin_map import (
     draw_reachability,
 )
 from reachmap.plots.causes import causes_of, draw_causes
+from reachmap.plots.curves.saturation import (
+    draw_saturation,
+    saturation_of,
+    wilson_interval,
+)
 from reachmap.plots.parts.bin_view import percent_after
 from reachmap.plots.parts.squares import percent_text
 from reachmap.plots.placement import draw_placement, placement_words
-from reachmap.plots.saturation import draw_saturation, saturation_of, wilson_interval
 from reachmap.sampling.orientations import approach_directions, orientation_set
 from tests.support.optional import present
 from tests.support.ranking_maps import make_bin_map

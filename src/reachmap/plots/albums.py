@@ -12,6 +12,7 @@ import numpy as np
 from reachmap._typing import FloatArray
 from reachmap.errors import SettingsError
 from reachmap.maps.records import BinMap, BinPlacement, WorkspaceMap
+from reachmap.maps.robustness.record import Robustness
 from reachmap.maps.study.record import Study
 from reachmap.maps.summary.emptying import emptying_of
 from reachmap.maps.summary.statistics import are_independent
@@ -24,7 +25,9 @@ from reachmap.plots.bin_map import (
 )
 from reachmap.plots.causes import draw_causes
 from reachmap.plots.comparison import MapChange, draw_change_sheet, draw_comparison
-from reachmap.plots.emptying import draw_emptying
+from reachmap.plots.curves.emptying import draw_emptying
+from reachmap.plots.curves.robustness import draw_robustness
+from reachmap.plots.curves.saturation import draw_saturation
 from reachmap.plots.heatmap import draw_level
 from reachmap.plots.overview import draw_overview
 from reachmap.plots.parts.bin_view import percent_after
@@ -34,7 +37,6 @@ from reachmap.plots.parts.levels import QUANTITY_NAMES, Quantity, level_names
 from reachmap.plots.parts.stack import LevelStack, level_title, stack_of
 from reachmap.plots.parts.style import PercentMap
 from reachmap.plots.placement import draw_placement, placement_words
-from reachmap.plots.saturation import draw_saturation
 from reachmap.plots.study import draw_grid, draw_main_effects
 
 # How close a height must be to a level to mean it [m].
@@ -298,3 +300,14 @@ def study_album(
             draw = partial(draw_grid, study, k, percent_map)
             items.append(Picture(name=f"grid_{name}", title=name, draw=draw))
     return items
+
+
+def robustness_album(record: Robustness) -> list[Picture | Table]:
+    """List the picture of what errors cost."""
+    return [
+        Picture(
+            name="robustness",
+            title="Reachability over the errors of the cell",
+            draw=partial(draw_robustness, record),
+        )
+    ]

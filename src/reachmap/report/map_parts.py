@@ -21,13 +21,13 @@ from reachmap.plots.bin_map import (
     draw_directions,
     draw_reachability,
 )
-from reachmap.plots.emptying import draw_emptying
+from reachmap.plots.curves.emptying import draw_emptying
+from reachmap.plots.curves.saturation import draw_saturation
 from reachmap.plots.heatmap import draw_level
 from reachmap.plots.overview import draw_overview
 from reachmap.plots.parts.levels import level_names
 from reachmap.plots.parts.stack import stack_of
 from reachmap.plots.placement import draw_placement
-from reachmap.plots.saturation import draw_saturation
 from reachmap.ranking.lookup.columns import columns_of
 from reachmap.ranking.lookup.settings import RankSettings
 from reachmap.ranking.lookup.table import table_from_bin_map

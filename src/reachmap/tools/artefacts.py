@@ -6,18 +6,17 @@ from pathlib import Path
 
 from reachmap.disk import is_there
 from reachmap.errors import MapFileError
-from reachmap.maps.format.registry import Artefact, read_artefact
-from reachmap.maps.study.record import Study
+from reachmap.maps.format.registry import Artefact, Result, read_artefact
 from reachmap.runtime.journal import is_store
 from reachmap.runtime.store import store_path
 
 
-def read_artefact_or_journal(path: Path) -> tuple[Artefact | Study, bool]:
+def read_artefact_or_journal(path: Path) -> tuple[Artefact | Result, bool]:
     """Read an artefact, or what a journal holds so far.
 
     Returns
     -------
-    record : WorkspaceMap, BinMap, BinPlacement or Study
+    record : WorkspaceMap, BinMap, BinPlacement, Study or Robustness
     finished : bool
         Whether it was an artefact.
 

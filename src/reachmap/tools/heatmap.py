@@ -15,11 +15,14 @@ from reachmap.maps import (
     read_workspace_map,
 )
 from reachmap.maps.records import BinMap, BinPlacement, WorkspaceMap
+from reachmap.maps.robustness.format import read_robustness
+from reachmap.maps.robustness.record import Robustness
 from reachmap.maps.study.format import read_study
 from reachmap.maps.study.record import Study
 from reachmap.plots.albums import (
     bin_album,
     placement_album,
+    robustness_album,
     study_album,
     workspace_album,
 )
@@ -29,6 +32,8 @@ from reachmap.plots.parts.style import Format, PercentMap
 from reachmap.ranking.lookup.columns import columns_of
 from reachmap.ranking.lookup.settings import RankSettings
 from reachmap.ranking.lookup.table import table_from_bin_map
+
+NO_LEVELS = ("bin_map", "bin_placement", "study", "robustness")
 
 logger = logging.getLogger(__name__)
 
@@ -45,7 +50,7 @@ def heatmap(
     tables: bool = False,
     overwrite: bool = False,
 ) -> tuple[Path, ...]:
-    """Draw a workspace map, a bin map, a placement or a study.
+    """Draw a workspace map, a bin map, a placement, a study or a robustness.
 
     Parameters
     ----------
@@ -73,14 +78,14 @@ def heatmap(
         The files written.
     """
     found = artefact_kind(artefact)
-    if found in ("bin_map", "bin_placement", "study") and (quantity or levels):
+    if found in NO_LEVELS and (quantity or levels):
         raise SettingsError(
             f"{artefact}: --quantity and --level are for workspace maps (this is a "
             f"{found.replace('_', ' ')})"
         )
     if workspace is not None and found != "bin_placement":
         raise SettingsError(f"{artefact}: --workspace is for placements")
-    record: WorkspaceMap | BinMap | BinPlacement | Study
+    record: WorkspaceMap | BinMap | BinPlacement | Study | Robustness
     items: list[Picture | Table]
     if found == "bin_map":
         record = read_bin_map(artefact)
@@ -89,9 +94,12 @@ def heatmap(
         record = read_placement(artefact)
         below = _map_below(artefact, record, workspace)
         items = placement_album(record, below, percent_map=percent_map, tables=tables)
+    elif tables and found in ("study", "robustness"):
+        raise SettingsError(f"{artefact}: --csv is for maps (info --json has all)")
+    elif found == "robustness":
+        record = read_robustness(artefact)
+        items = robustness_album(record)
     elif found == "study":
-        if tables:
-            raise SettingsError(f"{artefact}: --csv is for maps (info --json has all)")
         record = read_study(artefact)
         items = study_album(record, percent_map=percent_map)
     else:

@@ -9,8 +9,13 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from reachmap.maps.bytes.to_json import json_ready
-from reachmap.maps.format.registry import Artefact, kind_of
+from reachmap.maps.format.registry import Artefact, Result, kind_of
 from reachmap.maps.records import BinMap, WorkspaceMap
+from reachmap.maps.robustness.record import Robustness
+from reachmap.maps.robustness.summary import (
+    RobustnessSummary,
+    summarise_robustness,
+)
 from reachmap.maps.study.record import Study
 from reachmap.maps.summary.bin import BinSummary, summarise_bin
 from reachmap.maps.summary.placement import PlacementSummary, summarise_placement
@@ -18,7 +23,9 @@ from reachmap.maps.summary.study import StudySummary, summarise_study
 from reachmap.maps.summary.workspace import WorkspaceSummary, summarise_workspace
 from reachmap.tools.artefacts import read_artefact_or_journal
 
-Summary: TypeAlias = WorkspaceSummary | BinSummary | PlacementSummary | StudySummary
+Summary: TypeAlias = (
+    WorkspaceSummary | BinSummary | PlacementSummary | StudySummary | RobustnessSummary
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,14 +39,15 @@ class ArtefactInfo:
         As in ``"bin_map"``.
     finished : bool
         False for the journal of a run that goes on or was interrupted.
-    record : WorkspaceMap, BinMap, BinPlacement or Study
-    summary : WorkspaceSummary, BinSummary, PlacementSummary or StudySummary
+    record : WorkspaceMap, BinMap, BinPlacement, Study or Robustness
+    summary : WorkspaceSummary, BinSummary, PlacementSummary, StudySummary or
+        RobustnessSummary
     """
 
     path: Path
     kind: str
     finished: bool
-    record: Artefact | Study
+    record: Artefact | Result
     summary: Summary
 
     @property
@@ -91,6 +99,8 @@ def info(path: Path) -> ArtefactInfo:
         summary = summarise_bin(record)
     elif isinstance(record, Study):
         summary = summarise_study(record)
+    elif isinstance(record, Robustness):
+        summary = summarise_robustness(record)
     else:
         summary = summarise_placement(record)
     return ArtefactInfo(

@@ -14,6 +14,7 @@ from reachmap.errors import SettingsError
 from reachmap.maps.bytes.publish import check_outputs, publish
 from reachmap.maps.format.registry import Artefact, read_artefact
 from reachmap.maps.records import BinMap
+from reachmap.maps.robustness.record import Robustness
 from reachmap.maps.study.record import Study
 from reachmap.tools.options import cell_of_artefact
 from reachmap.tools.prologue import path_of_cell, refuse_cell_files
@@ -127,7 +128,7 @@ def _read(source: Path) -> tuple[Artefact | None, LoadedCell]:
     if source.suffix in SUFFIXES or str(source) in shipped_cells():
         return None, read_cell(str(source))
     record = read_artefact(source)
-    if isinstance(record, Study):
+    if isinstance(record, Study | Robustness):
         raise SettingsError(f"{source}: a study has no view (heatmap draws it)")
     return record, cell_of_artefact(record.provenance, str(source))
 

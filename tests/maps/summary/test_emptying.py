@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from reachmap.maps.summary.emptying import emptying_of, volume_left
-from reachmap.plots.emptying import draw_emptying
+from reachmap.plots.curves.emptying import draw_emptying
 from tests.support.optional import present
 from tests.support.synthetic_maps import synthetic_bin_map
 

@@ -132,6 +132,7 @@ KINDS: Final[dict[str, Kind]] = {
     "bin_map": Kind("bin map", "reachmap bin-scan"),
     "bin_placement": Kind("bin placement", "reachmap place-bin"),
     "study": Kind("study", "reachmap study"),
+    "robustness": Kind("robustness of a bin map", "reachmap robust"),
 }
 """Every kind of artefact, also for readers that know the layout of one alone."""
 

@@ -14,20 +14,25 @@ from reachmap.maps.format.placement import PLACEMENT, placement_from_tree
 from reachmap.maps.format.store import load
 from reachmap.maps.format.workspace import WORKSPACE, workspace_map_from_tree
 from reachmap.maps.records import BinMap, BinPlacement, Provenance, WorkspaceMap
+from reachmap.maps.robustness.format import ROBUSTNESS, robustness_from_tree
+from reachmap.maps.robustness.record import Robustness
 from reachmap.maps.study.format import STUDY, study_from_tree
 from reachmap.maps.study.record import Study
 
 Artefact: TypeAlias = WorkspaceMap | BinMap | BinPlacement
+Result: TypeAlias = Study | Robustness
+"""What is found out about maps; no map itself."""
 
-_RECORDS: Final[dict[str, Callable[[Tree, Path], Artefact | Study]]] = {
+_RECORDS: Final[dict[str, Callable[[Tree, Path], Artefact | Result]]] = {
     "workspace_map": workspace_map_from_tree,
     "bin_map": bin_map_from_tree,
     "bin_placement": placement_from_tree,
     "study": study_from_tree,
+    "robustness": robustness_from_tree,
 }
 
 
-def read_artefact(path: Path) -> Artefact | Study:
+def read_artefact(path: Path) -> Artefact | Result:
     """Read an artefact of any kind; everything about it is checked.
 
     Raises
@@ -39,17 +44,19 @@ def read_artefact(path: Path) -> Artefact | Study:
     return _RECORDS[layout.kind](tree, path)
 
 
-def kind_of(record: Artefact | Study) -> str:
+def kind_of(record: Artefact | Result) -> str:
     """Kind of a record, as in ``"bin_map"``."""
     if isinstance(record, WorkspaceMap):
         return "workspace_map"
     if isinstance(record, Study):
         return "study"
+    if isinstance(record, Robustness):
+        return "robustness"
     return "bin_map" if isinstance(record, BinMap) else "bin_placement"
 
 
 LAYOUTS: Final[dict[str, Layout]] = {
-    layout.kind: layout for layout in (WORKSPACE, BIN, PLACEMENT, STUDY)
+    layout.kind: layout for layout in (WORKSPACE, BIN, PLACEMENT, STUDY, ROBUSTNESS)
 }
 """Kind to format."""
 

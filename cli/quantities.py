@@ -1,0 +1,68 @@
+"""Lengths and angles with their units on the command line: ``5mm``, ``1deg``."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import click
+import numpy as np
+
+LENGTHS_M = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
+ANGLES_RAD = {"deg": np.pi / 180.0, "°": np.pi / 180.0, "rad": 1.0}
+NUMBER = r"(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:e[-+]?[0-9]+)?"
+QUANTITY = re.compile(rf"({NUMBER})(mm|cm|m|deg|°|rad)", re.IGNORECASE)
+
+
+class ErrorSizeType(click.ParamType):  # type: ignore[type-arg, unused-ignore]
+    """How far something is off: ``5mm``, ``1deg`` or ``5mm 1deg`` as (m, rad)."""
+
+    name = "size"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[float, float]:
+        """Read one; click reports what is none."""
+        if isinstance(value, tuple):
+            return value
+        sizes: dict[str, float] = {}
+        for word in str(value).split():
+            found = QUANTITY.fullmatch(word)
+            if found is None:
+                self.fail(f"{word!r}: expected a number with its unit, 5mm or 1deg.")
+            unit = found[2].lower()
+            kind, factors = (
+                ("shift", LENGTHS_M) if unit in LENGTHS_M else ("turn", ANGLES_RAD)
+            )
+            if kind in sizes:
+                self.fail(f"{value!r}: expected one length and one angle at most.")
+            sizes[kind] = float(found[1]) * float(factors[unit])
+        if not sizes:
+            self.fail("expected a length, an angle or both, as in 5mm 1deg.")
+        return sizes.get("shift", 0.0), sizes.get("turn", 0.0)
+
+
+ERROR_SIZE = ErrorSizeType()
+
+
+class QuantityCommand(click.Command):
+    """A command whose options take one or two quantities: ``--bin 5mm 1deg``."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Join the quantities that follow an option for them into one word."""
+        names = {
+            name
+            for parameter in self.params
+            if parameter.type is ERROR_SIZE
+            for name in parameter.opts
+        }
+        joined: list[str] = []
+        open_value = False
+        for word in args:
+            if open_value and QUANTITY.fullmatch(word):
+                joined[-1] += f" {word}"
+                continue
+            open_value = bool(joined) and joined[-1] in names
+            joined.append(word)
+            open_value = open_value or (word.partition("=")[0] in names and "=" in word)
+        return super().parse_args(ctx, joined)

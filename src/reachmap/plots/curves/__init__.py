@@ -1,0 +1,1 @@
+"""Curves: shares over attempts, over the height of parts, over errors."""

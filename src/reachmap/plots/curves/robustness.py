@@ -1,0 +1,76 @@
+"""What errors cost: certified and kept reachability over their size."""
+
+from __future__ import annotations
+
+from matplotlib.figure import Figure
+
+from reachmap.maps.robustness.record import Robustness
+from reachmap.maps.robustness.summary import error_words, summarise_robustness
+from reachmap.plots.parts.style import (
+    BIN_COLOUR,
+    INK,
+    MUTED,
+    axes_at,
+    drawing,
+    new_figure,
+    put_title,
+)
+
+
+@drawing()
+def draw_robustness(record: Robustness) -> Figure:
+    """Test grasps that stay reachable over multiples of the errors.
+
+    Parameters
+    ----------
+    record : Robustness
+    """
+    summary = summarise_robustness(record)
+    figure = new_figure(6.8, 4.6)
+    axes = axes_at(figure, 0.85, 0.62, 5.6, 3.15)
+    scale = [step.scale for step in summary.steps]
+    axes.fill_between(
+        scale,
+        [step.lowest for step in summary.steps],
+        [step.highest for step in summary.steps],
+        color=BIN_COLOUR,
+        alpha=0.18,
+        linewidth=0,
+        label=f"least and most of {summary.samples} cells",
+    )
+    lines = (
+        ("reachability", "stay reachable, mean", BIN_COLOUR, "o", "-"),
+        ("always", "stay reachable in every cell", "#7b1fa2", "s", "--"),
+        ("certified", "certified: no error of this size can end them", INK, "^", ":"),
+    )
+    for name, words, colour, marker, style in lines:
+        axes.plot(
+            scale,
+            [getattr(step, name) for step in summary.steps],
+            color=colour,
+            marker=marker,
+            linestyle=style,
+            linewidth=1.6,
+            markersize=5,
+            label=words,
+        )
+    axes.axvline(1.0, color=MUTED, linewidth=1.0)
+    axes.set_xlim(0.0, scale[-1])
+    axes.set_ylim(0.0, 104.0)
+    axes.set_xlabel(f"size of the errors; 1 is {error_words(summary.errors)}")
+    axes.set_ylabel("test grasps [%]")
+    axes.grid(axis="y", color="#e4e4e4", linewidth=0.7)
+    axes.set_axisbelow(True)
+    axes.legend(loc="lower left", fontsize=8.5, frameon=False)
+    for spine in ("top", "right"):
+        axes.spines[spine].set_visible(False)
+    given = summary.given
+    put_title(
+        figure,
+        0.85,
+        f"{given.reachability:.1f} % of the test grasps stay reachable, "
+        f"{given.certified:.1f} % for certain",
+        f"{error_words(summary.errors)} off; of {summary.steps[0].reachability:.1f} % "
+        "without errors",
+    )
+    return figure

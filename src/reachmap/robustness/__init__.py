@@ -1,0 +1,1 @@
+"""Which grasps stay reachable when bin, camera or tool are off."""
