@@ -9,6 +9,7 @@ import pytest
 from click.testing import CliRunner
 
 from reachmap.cell.loading import read_cell
+from reachmap.cell.model.shapes import triangles_of
 from reachmap.cli import group
 from reachmap.core.collision.bodies import build_geometry
 from reachmap.core.collision.misplacement import MovableBodies
@@ -115,11 +116,8 @@ def test_no_error_moves_a_point_further_than_its_bound():
                     geometry.geometryObjects[body].placement.homogeneous
                     for geometry in (bodies.geometry, moved.geometry)
                 )
-                box = bodies.shapes[body].box
-                if box is None:  # of a cylinder the ends of its axis
-                    box = (0, 0, bodies.shapes[body].cylinder.length)
-                signs = np.array(np.meshgrid(*[[-0.5, 0.5]] * 3)).reshape(3, -1).T
-                corners = np.column_stack([signs * box, np.ones(8)])
+                points = triangles_of(bodies.shapes[body]).vertices
+                corners = np.column_stack([points, np.ones(len(points))])
                 step = np.linalg.norm(corners @ (after - before).T, axis=1).max()
                 farthest[k] = max(farthest[k], step)
     assert (farthest <= bounds).all()
