@@ -1,12 +1,11 @@
-"""What real planning picks out of heaps against what the emptying curve says.
+"""Heaps picked to the end with the map alone, and by real planning.
 
-A heap is a bin of parts at random places and heights, each with the direction of its
-top face; what is below a part is in the way. Every part is planned to from the scan
-configuration with the cell's own planner, at whichever of its rolls has a goal, and
-the share of parts picked is compared with the map's curve of directions at the same
-heights.
+A heap is dropped into the bin of the map's cell. ``reachmap empty`` says from the map
+which parts come out; here every part is planned to as well, from the scan configuration
+with the cell's own planner and as many rolls as the map has, in the bin filled up to
+that part. Both pick in the same way, so what stays differs by what the map is wrong in.
 
-    python benchmarks/bench_emptying.py bin.h5 [heaps]
+    python benchmarks/bench_emptying.py bin.h5 [heaps [LxWxH in mm]]
 """
 
 from __future__ import annotations
@@ -19,13 +18,17 @@ import numpy as np
 from reachmap._typing import FloatArray
 from reachmap.cell.loading import LoadedCell, cell_from_json
 from reachmap.core.scene import Scene
+from reachmap.geometry import AXES
 from reachmap.maps import BinMap, read_bin_map
-from reachmap.maps.summary.directions import reachability_of_directions
-from reachmap.maps.summary.emptying import emptying_of
-from reachmap.sampling.frames import bin_test_frames
+from reachmap.picking.emptying import Fate, empty_heap
+from reachmap.picking.heap import Heap, drop_heap
+from reachmap.ranking.lookup.approach import complete_rotation
+from reachmap.ranking.lookup.ranker import Ranker
+from reachmap.sampling.frames import approach_distance_m
 from reachmap.scans.ik_survey import survey_frames
+from reachmap.tools.empty import FILL, part_costs
 
-HEIGHTS, PARTS = 6, 30
+SEED = 100
 
 
 def at_height(record: BinMap, height: float) -> LoadedCell:
@@ -44,72 +47,65 @@ def at_height(record: BinMap, height: float) -> LoadedCell:
     return loaded.filled_to(0)
 
 
-def parts_in(
-    record: BinMap, scene: Scene, rng: np.random.Generator
-) -> list[FloatArray]:
-    """T_base_tcp of parts, all rolls of one direction each, (k, 4, 4)."""
-    half = np.array([np.abs(record.x).max(), np.abs(record.y).max()])
-    cell, spec = scene.loaded.cell, scene.loaded.cell.bin_scan
-    parts = []
-    for _ in range(PARTS):
-        azimuth = {"azimuth_offset_deg": float(rng.uniform(0, 360))}
-        family = spec.orientations.model_copy(update=azimuth)
-        turned = spec.model_copy(update={"orientations": family})
-        T = bin_test_frames(
-            cell.model_copy(update={"bin_scan": turned}), scene.T_base_bin
-        ).T_base_tcp.reshape(-1, 4, 4)
-        rolls = [ring.rolls for ring in family.rings() for _ in range(ring.azimuths)]
-        direction = int(rng.integers(len(rolls)))
-        first = sum(rolls[:direction])
-        T = T[first : first + rolls[direction]].copy()
-        place = np.append(rng.uniform(-half, half), 0.0)
-        T[:, :3, 3] += scene.T_base_bin[:3, :3] @ place
-        parts.append(T)
-    return parts
+def poses_of(record: BinMap, heap: Heap, part: int, rolls: int) -> FloatArray:
+    """T_base_tcp of a part at every roll, (rolls, 4, 4), the first at random."""
+    T_base_bin = record.bin_pose
+    approach = -T_base_bin[:3, :3] @ heap.normal[part]
+    R = complete_rotation(approach[None], T_base_bin[:3, :3], record.approach_axis)[0]
+    axis, _ = AXES[record.approach_axis]
+    phase = np.random.default_rng([SEED, part]).uniform(0.0, 2.0 * np.pi)
+    angles = phase + 2.0 * np.pi * np.arange(rolls) / rolls
+    T = np.tile(np.eye(4), (rolls, 1, 1))
+    u, v = (axis + 1) % 3, (axis + 2) % 3
+    turn = np.tile(np.eye(3), (rolls, 1, 1))
+    turn[:, u, u] = turn[:, v, v] = np.cos(angles)
+    turn[:, v, u], turn[:, u, v] = np.sin(angles), -np.sin(angles)
+    T[:, :3, :3] = R @ turn
+    T[:, :3, 3] = T_base_bin[:3, :3] @ heap.position[part] + T_base_bin[:3, 3]
+    return T
 
 
-def picked(scene: Scene, parts: list[FloatArray], seed: int) -> int:
-    """Parts that the planner reaches at one of their rolls."""
+def planned_cost(record: BinMap, heap: Heap, part: int, rolls: int) -> float:
+    """0 where the planner reaches a part at one of its rolls, else infinite."""
+    height = min(float(heap.position[part, 2]), float(record.bin_inner[2]))
+    scene = Scene.build(at_height(record, height))
     survey = survey_frames(
-        scene, np.vstack(parts), scene.loaded.cell.bin_scan.approach_distance_m
+        scene,
+        poses_of(record, heap, part, rolls),
+        approach_distance_m(scene.loaded.cell),
     )
-    ends = np.cumsum([len(rolls) for rolls in parts])
-    count = 0
-    for k, end in enumerate(ends.tolist()):
-        rows = [survey.goals_of(frame) for frame in range(end - len(parts[k]), end)]
-        goals = survey.goals[np.concatenate(rows)]
-        if len(goals):
-            plan = scene.planner.plan(scene.scan_configuration, goals, seed + k)
-            count += plan.path is not None
-    return count
+    if not len(survey.goals):
+        return float("inf")
+    plan = scene.planner.plan(scene.scan_configuration, survey.goals, SEED + part)
+    return 0.0 if plan.path is not None else float("inf")
 
 
 def main() -> None:
-    """Print one line a heap: parts, picked, what the curve says."""
+    """Print one line a heap."""
     record = read_bin_map(Path(sys.argv[1]))
     heaps = int(sys.argv[2]) if len(sys.argv) > 2 else 3
-    found = emptying_of(record)
-    assert found is not None
-    heights = [level.height_m for level in found.levels]
-    # Parts lie anywhere between the outermost points, which stand for half as much.
-    directions = reachability_of_directions(record)[0]
-    wide = np.trapezoid(directions, record.x) / np.ptp(record.x)
-    curve = np.trapezoid(wide, record.y) / np.ptp(record.y)
-    gaps = []
-    for heap in range(heaps):
-        rng = np.random.default_rng(100 + heap)
-        got, told = 0, []
-        for height in np.sort(rng.uniform(heights[0], heights[-1], HEIGHTS))[::-1]:
-            scene = Scene.build(at_height(record, float(height)))
-            parts = parts_in(record, scene, rng)
-            got += picked(scene, parts, seed=1000 * heap)
-            told.append(float(np.interp(height, heights, curve)))
-        share, expected = 100.0 * got / (HEIGHTS * PARTS), float(np.mean(told))
-        gaps.append(share - expected)
-        error = 100.0 * np.sqrt(share * (100 - share)) / 100 / np.sqrt(HEIGHTS * PARTS)
+    sides = sys.argv[3] if len(sys.argv) > 3 else "80x60x40"
+    x, y, z = (float(side) / 1e3 for side in sides.split("x"))
+    cell = at_height(record, 0.0).cell
+    rings = cell.bin_scan.orientations.rings()
+    rolls = max(ring.rolls for ring in rings)
+    ranker, gaps = Ranker(record), []
+    for number in range(heaps):
+        heap = drop_heap(cell.bin, (x, y, z), FILL, SEED + number)
+        told, _ = part_costs(ranker, record, heap)
+        done = np.array(
+            [planned_cost(record, heap, part, rolls) for part in range(len(heap))]
+        )
+        left = [
+            100.0 * float((empty_heap(heap, cost).fate != Fate.PICKED).mean())
+            for cost in (told, done)
+        ]
+        gaps.append(left[0] - left[1])
+        alike = float((np.isfinite(told) == np.isfinite(done)).mean())
         print(
-            f"heap {heap + 1}: {HEIGHTS * PARTS} parts, picked {share:.1f} % "
-            f"(± {error:.1f}), the curve says {expected:.1f} %",
+            f"heap {number + 1}: {len(heap)} parts, {left[0]:.1f} % stay by the map, "
+            f"{left[1]:.1f} % by planning; reached {np.isfinite(told).sum()} and "
+            f"{np.isfinite(done).sum()}, alike for {100 * alike:.1f} %",
             flush=True,
         )
     print(f"mean difference {np.mean(gaps):+.1f} points")

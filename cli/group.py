@@ -73,6 +73,7 @@ COMMANDS: dict[str, Entry] = {
             "report": "Write a run as one self-contained page.",
             "compare": "Compare two maps of the same kind, frame by frame.",
             "study": "Map variants of a cell, and say which change is more than noise.",
+            "empty": "Fill a bin with parts and pick them to the end.",
             "robust": "Say which grasps survive when bin, camera or tool are off.",
             "validate": "Test a bin map against real planning to real grasps.",
         },

@@ -1,4 +1,4 @@
-"""Lengths and angles with their units on the command line: ``5mm``, ``1deg``."""
+"""Lengths and angles with their units on the command line: ``5mm``, ``1deg``, boxes."""
 
 from __future__ import annotations
 
@@ -11,6 +11,9 @@ import numpy as np
 LENGTHS_M = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
 ANGLES_RAD = {"deg": np.pi / 180.0, "°": np.pi / 180.0, "rad": 1.0}
 NUMBER = r"(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:e[-+]?[0-9]+)?"
+BOX_SIDES = re.compile(
+    rf"({NUMBER})\s*x\s*({NUMBER})\s*x\s*({NUMBER})\s*(mm|cm|m)", re.IGNORECASE
+)
 QUANTITY = re.compile(rf"({NUMBER})(mm|cm|m|deg|°|rad)", re.IGNORECASE)
 
 
@@ -43,6 +46,28 @@ class ErrorSizeType(click.ParamType):  # type: ignore[type-arg, unused-ignore]
 
 
 ERROR_SIZE = ErrorSizeType()
+
+
+class BoxType(click.ParamType):  # type: ignore[type-arg, unused-ignore]
+    """Three sides with one unit: ``60x40x20mm``, in metres."""
+
+    name = "box"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[float, float, float]:
+        """Read one; click reports what is none."""
+        if isinstance(value, tuple):
+            return value
+        found = BOX_SIDES.fullmatch(str(value).strip())
+        if found is None:
+            self.fail(f"{value!r}: expected three sides and a unit, 60x40x20mm.")
+        factor = LENGTHS_M[found[4].lower()]
+        x, y, z = (factor * float(found[k]) for k in (1, 2, 3))
+        return x, y, z
+
+
+BOX = BoxType()
 
 
 class QuantityCommand(click.Command):

@@ -165,10 +165,10 @@ def _place(record: BinMap, left: FloatArray) -> str:
     shares = {side: float(left[here].sum()) / total for side, here in sides.items()}
     side = max(shares, key=lambda key: shares[key])
     if shares[side] >= MOST:
-        return f"along the {_wall(record, *side)} wall"
+        return f"along the {wall_name(record, *side)} wall"
     for axis, name in ((0, "x"), (1, "y")):
         if shares[axis, 1] + shares[axis, -1] >= 1.2 * MOST:
-            walls = {_wall(record, axis, s) for s in (1, -1)}
+            walls = {wall_name(record, axis, s) for s in (1, -1)}
             both = " and ".join(sorted(walls)) if len(walls) > 1 else f"two {name}"
             return f"along the {both} walls"
     edge = np.maximum(
@@ -183,7 +183,7 @@ def _place(record: BinMap, left: FloatArray) -> str:
     return "all over the bin"
 
 
-def _wall(record: BinMap, axis: int, sign: int) -> str:
+def wall_name(record: BinMap, axis: int, sign: int) -> str:
     """Name of a wall: near and far are those that face the robot and its opposite."""
     towards = inverse_transform(record.bin_pose)[:2, 3]
     along = int(np.argmax(np.abs(towards) / record.bin_inner[:2]))

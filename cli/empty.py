@@ -1,0 +1,92 @@
+"""``reachmap empty``: pick heaps to the end, and say what stays."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Literal
+
+import click
+
+from reachmap.cli.options import (
+    INPUT_FILE,
+    json_option,
+    output_option,
+    overwrite_option,
+    seed_option,
+)
+from reachmap.cli.quantities import BOX
+
+
+@click.command()
+@click.argument("bin_map", metavar="BIN_MAP", type=INPUT_FILE)
+@click.option(
+    "--part",
+    type=BOX,
+    metavar="LxWxH",
+    help="Sides of a box around the part, 60x40x20mm; default: the part of the cell.",
+)
+@click.option(
+    "--fill",
+    type=float,
+    default=0.9,
+    show_default=True,
+    metavar="SHARE",
+    help="Share of the depth that the parts reach up to, on average.",
+)
+@click.option(
+    "--heaps",
+    type=int,
+    default=3,
+    show_default=True,
+    metavar="N",
+    help="Heaps, with seeds one after the other.",
+)
+@click.option(
+    "--order",
+    type=click.Choice(["highest", "rank"]),
+    default="highest",
+    show_default=True,
+    help="Of what lies free: the highest part first, or the one that costs least.",
+)
+@output_option(help="Also write every part with its place and fate (JSON).")
+@seed_option
+@overwrite_option
+@json_option
+def command(
+    bin_map: Path,
+    part: tuple[float, float, float] | None,
+    fill: float,
+    heaps: int,
+    order: Literal["highest", "rank"],
+    output: Path | None,
+    seed: int | None,
+    overwrite: bool,
+    as_json: bool,
+) -> None:
+    """Fill a bin with parts and pick them to the end.
+
+    Parts fall at random places of the bin and come to rest on what lies there. Each is
+    grasped at the middle of its top, along its normal, if BIN_MAP reaches the test
+    grasp nearest to that, and once no other part covers it. Nothing is planned.
+
+    Example: reachmap empty bin.h5 --part 60x40x20mm
+    """
+    from reachmap.cli.text.emptying import emptying_lines
+    from reachmap.tools.empty import empty
+
+    answer = empty(
+        bin_map,
+        part=part,
+        fill=fill,
+        heaps=heaps,
+        order=order,
+        seed=seed,
+        output=output,
+        overwrite=overwrite,
+    )
+    if as_json:
+        click.echo(json.dumps(answer.facts()))
+    else:
+        written = [] if output is None else [str(output)]
+        click.echo("\n".join([*emptying_lines(answer), *written]))

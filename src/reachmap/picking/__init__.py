@@ -1,0 +1,1 @@
+"""Heaps of parts in a bin, and picking them to the end."""

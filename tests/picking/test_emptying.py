@@ -1,0 +1,162 @@
+"""Heaps and picking them: geometry by brute force, order and words by counting."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from reachmap.cell.model.bodies import BinSpec
+from reachmap.cli import group
+from reachmap.maps import read_bin_map, write_bin_map
+from reachmap.picking.emptying import Fate, empty_heap
+from reachmap.picking.heap import Heap, drop_heap
+from reachmap.ranking.lookup.ranker import Ranker
+from reachmap.tools.empty import empty, part_costs
+from tests.support.synthetic_maps import synthetic_bin_map
+
+BIN = BinSpec(inner=(0.4, 0.3, 0.2))
+PART = (0.06, 0.04, 0.02)
+
+
+def a_heap(heights, above):
+    """Parts at heights, each with those that cover it."""
+    count = len(heights)
+    position = np.column_stack([np.zeros((count, 2)), heights])
+    return Heap(
+        position=position,
+        normal=np.tile([0.0, 0.0, 1.0], (count, 1)),
+        above=tuple(np.array(parts, np.int64) for parts in above),
+    )
+
+
+def test_parts_lie_in_the_bin_and_on_each_other():
+    """Tops between one thickness above the bottom and the rim; none is too steep."""
+    heap = drop_heap(BIN, PART, 0.8, seed=4)
+    assert len(heap) > 100
+    assert (np.abs(heap.position[:, :2]) < np.array([0.2, 0.15])).all()
+    assert heap.position[:, 2].min() >= min(PART) - 1e-9
+    assert heap.position[:, 2].max() <= 0.2
+    np.testing.assert_allclose(np.linalg.norm(heap.normal, axis=1), 1.0)
+    assert heap.normal[:, 2].min() > 0.8
+    for part, parts in enumerate(heap.above):
+        assert (parts > part).all()
+
+
+def test_what_covers_a_part_lies_over_it():
+    """A part whose middle another one hides waits for it, by all pairs."""
+    heap = drop_heap(BIN, PART, 0.8, seed=5)
+    for part, parts in enumerate(heap.above):
+        away = heap.position[parts, :2] - heap.position[part, :2]
+        # Farther apart than two half diagonals they cannot touch.
+        assert (np.hypot(*away.T) <= np.hypot(PART[0], PART[1])).all()
+        assert (heap.position[parts, 2] > heap.position[part, 2] - max(PART)).all()
+
+
+def test_the_bottom_layer_of_a_shallow_heap_is_flat():
+    """The first parts lie on the bottom, their tops one side above it."""
+    heap = drop_heap(BIN, (0.1, 0.1, 0.05), 0.05, seed=1)
+    first = heap.position[0, 2]
+    assert min(abs(first - side) for side in (0.1, 0.05)) < 1e-9
+    np.testing.assert_allclose(heap.normal[0], [0, 0, 1])
+
+
+def test_the_seed_decides_the_heap():
+    """Same seed, same heap."""
+    a, b, c = (drop_heap(BIN, PART, 0.5, seed=s) for s in (7, 7, 8))
+    np.testing.assert_array_equal(a.position, b.position)
+    assert a.position.shape != c.position.shape or (a.position != c.position).any()
+
+
+def test_too_large_a_part_fits_nowhere():
+    """A part as long as the bin's diagonal."""
+    assert len(drop_heap(BIN, (0.6, 0.5, 0.3), 0.5, seed=1)) == 0
+
+
+def test_a_part_below_one_that_stays_stays():
+    """Part 0 lies below 1, which is not reached; 2 lies below 3, which is."""
+    heap = a_heap([0.02, 0.04, 0.02, 0.05, 0.03], [[1], [], [3], [], []])
+    cost = np.array([1.0, np.inf, 1.0, 1.0, 0.5])
+    done = empty_heap(heap, cost)
+    wanted = [Fate.COVERED, Fate.UNREACHABLE, Fate.PICKED, Fate.PICKED, Fate.PICKED]
+    assert done.fate.tolist() == [int(fate) for fate in wanted]
+    assert done.turn.tolist() == [-1, -1, 2, 0, 1]
+    assert empty_heap(heap, cost, "rank").turn.tolist() == [-1, -1, 2, 1, 0]
+
+
+def test_what_can_be_picked_does_not_depend_on_the_order():
+    """Picking only ever frees parts, so both orders end alike."""
+    heap = drop_heap(BIN, PART, 0.8, seed=9)
+    rng = np.random.default_rng(2)
+    cost = np.where(rng.random(len(heap)) < 0.8, rng.random(len(heap)), np.inf)
+    a, b = (empty_heap(heap, cost, order) for order in ("highest", "rank"))
+    np.testing.assert_array_equal(a.fate, b.fate)
+    assert sorted(a.turn[a.turn >= 0]) == [*range(int((a.fate == 0).sum()))]
+    for part, parts in enumerate(heap.above):
+        if a.turn[part] >= 0:
+            assert (a.turn[parts] >= 0).all()
+            assert (a.turn[parts] < a.turn[part]).all()
+
+
+@pytest.fixture
+def bin_map(tmp_path):
+    """The shipped cell's tray, 50 mm deep, reached but for its far side (+x)."""
+    found = np.ones((1, 6, 8, 27, 1), bool)
+    found[:, :, 6:] = False
+    path = tmp_path / "bin.h5"
+    write_bin_map(path, synthetic_bin_map(found))
+    return path
+
+
+def test_what_stays_is_counted_and_named(bin_map):
+    """Parts beyond the reached columns stay; of those that the map knows, only they."""
+    answer = empty(bin_map, part=(0.03, 0.02, 0.01), heaps=2, seed=3)
+    record = read_bin_map(bin_map)
+    edge = float(record.x[5:7].mean())
+    for one in answer.heaps:
+        _, outside = part_costs(Ranker(record), record, one.heap)
+        x = one.heap.position[:, 0]
+        reached = np.isfinite(one.cost)
+        assert x[reached].max() < edge
+        assert x[~reached & ~outside].min() > edge
+        s = one.summary
+        assert s.parts == s.picked + s.unreachable + s.covered
+        assert s.unreachable > 0
+    again = empty(bin_map, part=(0.03, 0.02, 0.01), heaps=2, seed=3)
+    assert again.facts(with_parts=True) == answer.facts(with_parts=True)
+
+
+def test_the_command_says_it_in_words_and_numbers(bin_map, tmp_path):
+    """Table, JSON and the file agree; the empty bin is named on stderr."""
+    words = ["empty", str(bin_map), "--part", "30x20x10mm", "--seed", "3"]
+    out = tmp_path / "parts.json"
+    said = CliRunner().invoke(group, [*words, "-o", str(out)])
+    assert said.exit_code == 0, said.output
+    assert "parts below the one that is picked are no obstacle" in said.stderr
+    facts = json.loads(CliRunner().invoke(group, [*words, "--json"]).stdout)
+    assert f"{facts['picked']} of {facts['parts']} parts picked" in said.stdout
+    each = [
+        part for heap in json.loads(out.read_text())["heaps"] for part in heap["each"]
+    ]
+    assert len(each) == facts["parts"]
+    assert sum(part["fate"] == "picked" for part in each) == facts["picked"]
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ([], "its cell has no part"),
+        (["--part", "30x20mm"], "three sides and a unit"),
+        (["--part", "30x20x10mm", "--fill", "1.5"], "--fill must be"),
+        (["--part", "3x2x1m"], "not a single one fits"),
+        (["--part", "0x20x10mm"], "sides must be positive"),
+        (["--part", "1x1x1mm"], "more than 20000"),
+    ],
+)
+def test_wrong_parts_are_refused(bin_map, words, message):
+    """One line, exit code 2."""
+    answer = CliRunner().invoke(group, ["empty", str(bin_map), *words])
+    assert answer.exit_code == 2
+    assert message in answer.stderr
