@@ -12,6 +12,8 @@ from reachmap.cell.files.urdf import UrdfJoint
 from reachmap.cell.text.yaml_writer import WIDTH, scalar
 
 SIX_AXES = 6
+# Inner sizes: a usual bin, and a flat Euro container (600 x 400 x 120) for wide hands.
+BINS_M = (0.36, 0.26, 0.15), (0.56, 0.36, 0.11)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,6 +42,8 @@ class StarterChoices:
         From the tip to the TCP along the approach axis.
     reach_m : float
         How far the TCP gets from the base axis.
+    bin_inner_m : tuple of float
+        Inner size of the bin for an arm that reaches 0.9 m or more.
     bin_xyz_m, bin_yaw_deg : tuple of float, float
         Where the bin stands.
     scan_deg : dict
@@ -65,6 +69,7 @@ class StarterChoices:
     own_roll: bool = False
     tool_m: float = 0.0
     reach_m: float = 1.0
+    bin_inner_m: tuple[float, float, float] = BINS_M[0]
     bin_xyz_m: tuple[float, float, float] | None = None
     bin_yaw_deg: float = 90.0
     scan_deg: Mapping[str, float] = field(default_factory=dict)
@@ -213,7 +218,7 @@ def bin_size(reach_m: float) -> float:
 
 def _bin_inner(c: StarterChoices) -> list[float]:
     """Inner size of the bin [m]."""
-    return [round(side * bin_size(c.reach_m), 3) for side in (0.36, 0.26, 0.15)]
+    return [round(side * bin_size(c.reach_m), 3) for side in c.bin_inner_m]
 
 
 def _surroundings(c: StarterChoices) -> str:

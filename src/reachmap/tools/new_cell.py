@@ -16,6 +16,7 @@ from reachmap.cell.files.urdf import UrdfDescription
 from reachmap.cell.guesses import guess_base, guess_tip, is_tool_point
 from reachmap.cell.loading import LoadedCell, cell_from_text
 from reachmap.cell.starter import (
+    BINS_M,
     StarterChoices,
     cell_name,
     middle_position,
@@ -32,7 +33,7 @@ from reachmap.errors import CellError, ReachmapError, SceneError, SettingsError
 from reachmap.geometry import quaternion_wxyz_from_rotation
 from reachmap.maps.bytes.publish import check_output, publish
 from reachmap.tools import trial
-from reachmap.tools.bin_guess import BinGuess, guess_bin
+from reachmap.tools.bin_guess import ENOUGH, BinGuess, guess_bin
 from reachmap.tools.robot_source import RobotSource, read_source
 
 LABEL = "starter cell"
@@ -264,21 +265,29 @@ class _Attempt:
 
     def _with_bin(self, scene: Scene, Q: FloatArray) -> Scene:
         """Put the bin where it is clear of what stands still, and picked from."""
-        tip = self.choices.tip
-        guess = guess_bin(
-            Scene.build(scene.loaded, bin_moves=True),
-            scene.kinematics.forward_many(Q)[:, :3, 3],
-            with_tool=not is_tool_point(tip),
-        )
-        if guess is None:
+        tip, points = self.choices.tip, scene.kinematics.forward_many(Q)[:, :3, 3]
+        best: BinGuess | None = None
+        choices = self.choices
+        for inner_m in BINS_M:
+            self.choices = replace(choices, bin_inner_m=inner_m)
+            guess = guess_bin(
+                Scene.build(self._loaded(), bin_moves=True),
+                points,
+                with_tool=not is_tool_point(tip),
+            )
+            if guess is not None and (best is None or guess.share > best.share):
+                best, chosen = guess, self.choices
+            if best is not None and best.share >= ENOUGH:
+                break
+        if best is None:
             raise SceneError("bin.pose: the bin fits nowhere near the arm")
         self.choices = replace(
-            self.choices,
-            bin_xyz_m=guess.xyz_m,
-            bin_yaw_deg=guess.yaw_deg,
-            tool_m=guess.tool_m,
+            chosen,
+            bin_xyz_m=best.xyz_m,
+            bin_yaw_deg=best.yaw_deg,
+            tool_m=best.tool_m,
         )
-        self.notes += _words(guess, tip)
+        self.notes += _words(best, tip)
         return Scene.build(self._loaded())
 
     def _with_scan_configuration(self, scene: Scene, Q: FloatArray) -> tuple[str, ...]:
