@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from reachmap.errors import ReachmapError
     from reachmap.maps.format.registry import read_artefact as read_map
     from reachmap.maps.records import BinMap, BinPlacement, Status, WorkspaceMap
+    from reachmap.motions.library import MotionLibrary
     from reachmap.ranking.lookup.order import Ranking
     from reachmap.ranking.lookup.ranker import Ranker
     from reachmap.ranking.lookup.settings import RankSettings
@@ -43,6 +44,7 @@ _HOMES: Final[dict[str, str]] = {
     "BinMap": "maps.records",
     "BinPlacement": "maps.records",
     "LoadedCell": "cell.loaded",
+    "MotionLibrary": "motions.library",
     "RankSettings": "ranking.lookup.settings",
     "Ranker": "ranking.lookup.ranker",
     "Ranking": "ranking.lookup.order",
@@ -72,6 +74,7 @@ __all__ = [
     "BinMap",
     "BinPlacement",
     "LoadedCell",
+    "MotionLibrary",
     "RankSettings",
     "Ranker",
     "Ranking",

@@ -206,3 +206,31 @@ def _is_shallow(value: Any, levels: int = MAX_DEPTH) -> bool:
     if not isinstance(value, list):
         return True
     return levels > 0 and all(_is_shallow(item, levels - 1) for item in value)
+
+
+def cell_of_artefact(
+    provenance: Provenance, source: str, changes: Sequence[str] = ()
+) -> LoadedCell:
+    """Load the cell that an artefact was made from.
+
+    Parameters
+    ----------
+    provenance : Provenance
+    source : str
+        The artefact, for messages.
+    changes : sequence of str
+        Overrides to be made now.
+    """
+    # Imported here: what looks things up in a map needs no cell.
+    from reachmap.cell.loading import cell_from_json
+
+    return cell_from_json(
+        provenance.cell_resolved_json,
+        urdf=provenance.urdf,
+        srdf=provenance.srdf,
+        text=provenance.cell_yaml,
+        overrides=provenance.overrides,
+        changes=changes,
+        files_sha256=provenance.files_sha256,
+        source=source,
+    )

@@ -93,7 +93,20 @@ def motion_of(
     velocity, acceleration : array, shape (dof,)
         Limits [rad/s], [rad/s²].
     """
-    planned, way = way_points(bin_map, row)
+    layer, y, x, orientation = (int(k) for k in bin_map.paths.index[row][:4])
+    return timed(
+        *way_points(bin_map, row), (layer, y, x, orientation), velocity, acceleration
+    )
+
+
+def timed(
+    planned: FloatArray,
+    way: FloatArray,
+    test_grasp: tuple[int, int, int, int],
+    velocity: FloatArray,
+    acceleration: FloatArray,
+) -> Motion:
+    """Time a planned part (n, dof) and the straight approach (m, dof) from its end."""
     corners = merge_straight(planned) if len(planned) > 1 else planned
     times = np.concatenate(
         [[0.0], np.cumsum(segment_times_s(corners, velocity, acceleration))]
@@ -106,9 +119,8 @@ def motion_of(
         times = np.concatenate([times, reached])
         stages += (APPROACH,) * (len(way) - 1)
         configuration = np.concatenate([corners, way[1:]])
-    layer, y, x, orientation = (int(k) for k in bin_map.paths.index[row][:4])
     return Motion(
-        test_grasp=(layer, y, x, orientation),
+        test_grasp=test_grasp,
         configuration=configuration,
         stage=stages,
         time_s=times,

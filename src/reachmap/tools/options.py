@@ -5,19 +5,14 @@ from __future__ import annotations
 import logging
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from reachmap.cell.loading import cell_from_json
-from reachmap.maps import BinMap, Provenance, WorkspaceMap
+from reachmap.maps import BinMap, WorkspaceMap
+from reachmap.maps.provenance import cell_of_artefact
 from reachmap.maps.summary.nothing import why_nothing
 from reachmap.runtime.options import RunOptions
 from reachmap.runtime.store import store_path
 
 __all__ = ["RunOptions", "cell_of_artefact", "with_seed", "written_by"]
-
-if TYPE_CHECKING:
-    from reachmap.cell.loading import LoadedCell
-
 
 logger = logging.getLogger(__name__)
 
@@ -30,31 +25,6 @@ def with_seed(overrides: Sequence[str], seed: int | None) -> tuple[str, ...]:
 def written_by(output: Path, run: RunOptions) -> Path:
     """Name the file that a scan leaves: the artefact, or the journal of a shard."""
     return output if run.shard is None else store_path(output, run.shard)
-
-
-def cell_of_artefact(
-    provenance: Provenance, source: str, changes: Sequence[str] = ()
-) -> LoadedCell:
-    """Load the cell that an artefact was made from.
-
-    Parameters
-    ----------
-    provenance : Provenance
-    source : str
-        The artefact, for messages.
-    changes : sequence of str
-        Overrides to be made now.
-    """
-    return cell_from_json(
-        provenance.cell_resolved_json,
-        urdf=provenance.urdf,
-        srdf=provenance.srdf,
-        text=provenance.cell_yaml,
-        overrides=provenance.overrides,
-        changes=changes,
-        files_sha256=provenance.files_sha256,
-        source=source,
-    )
 
 
 def warn_of_nothing(record: WorkspaceMap | BinMap | None, output: Path) -> None:

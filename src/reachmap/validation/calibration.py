@@ -137,9 +137,12 @@ def _curve(share: FloatArray, reached: BoolArray) -> tuple[FloatArray, FloatArra
     count = max(1, len(share) // KNOT_GRASPS)
     parts = np.array_split(order, count)
     sizes = np.array([len(part) for part in parts], float)
+    hits = np.array([reached[part].sum() for part in parts], float)
+    begin = isotonic_regression(hits / sizes, weights=sizes).blocks[:-1]
+    count_of, hits_of = np.add.reduceat(sizes, begin), np.add.reduceat(hits, begin)
     # Half a success and half a failure added (Jeffreys): no rate is exactly 0 or 1.
-    rates = np.array([reached[part].sum() + 0.5 for part in parts]) / (sizes + 1.0)
-    fit = isotonic_regression(rates, weights=sizes).x
+    rate_of = isotonic_regression((hits_of + 0.5) / (count_of + 1.0), weights=count_of)
+    fit = np.repeat(rate_of.x, np.diff([*begin, len(parts)]))
     at = np.array([share[part].mean() for part in parts])
     at, first = np.unique(at, return_index=True)
     return at, np.asarray(fit[first])

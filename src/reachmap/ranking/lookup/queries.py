@@ -59,11 +59,14 @@ def queries_from_arrays(
     if directions is None and rotations is None:
         raise SettingsError("give directions or rotations")
     R = np.full((n, 3, 3), np.nan)
+    has_rotation: BoolArray = np.zeros(n, bool)
+    known: BoolArray = np.zeros(n, bool)
+    axes = np.full((n, 3), np.nan)
     if rotations is not None:
         R = _rows(rotations, "rotations", (3, 3), n)
-    has_rotation = ~np.isnan(R).all(axis=(1, 2))
-    known: BoolArray = _is_rotation(R)
-    axes = np.where(known[:, None], R @ axis_vector(table.approach_axis), np.nan)
+        has_rotation = np.logical_not(np.isnan(R).all(axis=(1, 2)))
+        known = _is_rotation(R)
+        axes = np.where(known[:, None], R @ axis_vector(table.approach_axis), np.nan)
     if directions is not None:
         given = _unit(_rows(directions, "directions", (3,), n))
         axes = np.where(has_rotation[:, None], axes, given)
