@@ -15,8 +15,10 @@ from reachmap.cli import group
 from reachmap.core.scene import Scene
 from reachmap.maps import read_bin_map, write_bin_map
 from reachmap.motions.motion import best_rows, trapezoid
+from reachmap.tools.bin_scan import bin_scan
 from reachmap.tools.options import cell_of_artefact
-from tests.support.dense_checks import dense_free
+from tests.support.dense_checks import DenseCheck, dense_free
+from tests.support.exported_motions import READERS
 from tests.support.toy_artefacts import toy_bin_map
 
 
@@ -155,3 +157,22 @@ def test_what_cannot_be_exported(
     assert result.exit_code == 2
     assert message in result.stderr
     assert result.stdout == ""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("to", READERS)
+def test_every_format_says_the_verified_motion(tmp_path: Path, to: str) -> None:
+    """Of a six-axis arm: read back from the text alone, and replayed on the meshes."""
+    path = tmp_path / "bin.h5"
+    small = ["bin_scan.grid=[2,2]", "bin_scan.repeats=1"]
+    record = bin_scan(None, path, cell="ur5-eye-in-hand", overrides=small)
+    assert record is not None
+    scene = Scene.build(cell_of_artefact(record.provenance, str(path)))
+    text = run(path, "--all", "--to", to).stdout
+    motions = READERS[to](text, scene.scan_configuration)
+    assert len(motions) == len(best_rows(record)) > 50
+    check = DenseCheck(scene, margin_m=0.0)
+    for way, place in zip(motions, best_rows(record), strict=True):
+        goal = scene.kinematics.forward(way[-1])[:3, 3]
+        np.testing.assert_allclose(goal, record.position[place[:3]], atol=1e-6)
+        assert check.path_is_free(way)

@@ -1,0 +1,102 @@
+"""Reads exported motions back, from their text alone."""
+
+from __future__ import annotations
+
+import csv
+import json
+import re
+from collections.abc import Callable, Mapping
+
+import numpy as np
+from ruamel.yaml import YAML
+
+from reachmap._typing import FloatArray
+
+Reader = Callable[[str, FloatArray], list[FloatArray]]
+"""Of a text and the configuration that motions begin at, which programs leave out."""
+
+
+def from_csv(text: str, start: FloatArray) -> list[FloatArray]:
+    """Way-points of each motion, (n, dof) each."""
+    lines = [line for line in text.splitlines() if not line.startswith("#")]
+    motions: dict[tuple[str, ...], list[list[float]]] = {}
+    for row in list(csv.reader(lines))[1:]:
+        motions.setdefault(tuple(row[:4]), []).append([float(v) for v in row[7:]])
+    return [np.array(way) for way in motions.values()]
+
+
+def from_json(text: str, start: FloatArray) -> list[FloatArray]:
+    """Way-points of each motion."""
+    return [np.array(one["configuration"]) for one in json.loads(text)["motions"]]
+
+
+def from_joint_trajectory(text: str, start: FloatArray) -> list[FloatArray]:
+    """Sampled positions of each message."""
+    return [_positions(one) for one in _documents(text)]
+
+
+def from_moveit(text: str, start: FloatArray) -> list[FloatArray]:
+    """Sampled positions of each message."""
+    return [_positions(one["joint_trajectory"]) for one in _documents(text)]
+
+
+def from_urscript(text: str, start: FloatArray) -> list[FloatArray]:
+    """Targets of ``movej`` of each function."""
+    return _programs(text, r"def (\w+)\(\):(.*?)\nend", r"movej\(\[([^]]*)\]", start)
+
+
+def from_krl(text: str, start: FloatArray) -> list[FloatArray]:
+    """Targets of ``PTP`` of each subroutine, degrees in the file."""
+    axes = r"PTP \{AXIS: ([^}]*)\}"
+    return _programs(text, r"DEF (\w+)\(\)(.*?)\nEND", axes, start, degrees=True)
+
+
+def from_rapid(text: str, start: FloatArray) -> list[FloatArray]:
+    """Targets of ``MoveAbsJ`` of each procedure, degrees in the file."""
+    axes = r"MoveAbsJ \[\[([^]]*)\]"
+    return _programs(text, r"PROC (\w+)\(\)(.*?)ENDPROC", axes, start, degrees=True)
+
+
+READERS: Mapping[str, Reader] = {
+    "csv": from_csv,
+    "json": from_json,
+    "joint-trajectory": from_joint_trajectory,
+    "moveit": from_moveit,
+    "urscript": from_urscript,
+    "krl": from_krl,
+    "rapid": from_rapid,
+}
+
+
+def _documents(text: str) -> list[dict]:
+    # One JSON object a document, which is faster to read than YAML.
+    bodies = [
+        "\n".join(line for line in part.splitlines() if not line.startswith("#"))
+        for part in text.split("\n---\n")
+    ]
+    return [_yaml(body) for body in bodies if body.strip()]
+
+
+def _yaml(body: str) -> dict:
+    try:
+        return dict(json.loads(body))
+    except ValueError:
+        return dict(YAML(typ="safe", pure=True).load(body))
+
+
+def _positions(trajectory: dict) -> FloatArray:
+    return np.array([point["positions"] for point in trajectory["points"]])
+
+
+def _programs(
+    text: str, routine: str, target: str, start: FloatArray, *, degrees: bool = False
+) -> list[FloatArray]:
+    motions = []
+    for _, body in re.findall(routine, text, flags=re.DOTALL):
+        rows = [
+            [float(re.sub(r"^\s*A\d ", "", value)) for value in row.split(",")]
+            for row in re.findall(target, body)
+        ]
+        goals = np.radians(rows) if degrees else np.array(rows)
+        motions.append(np.vstack([start, goals]))
+    return motions
