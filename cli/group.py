@@ -72,10 +72,16 @@ COMMANDS: dict[str, Entry] = {
             "view": "Look at a cell or an artefact in 3D, in the browser.",
             "report": "Write a run as one self-contained page.",
             "compare": "Compare two maps of the same kind, frame by frame.",
-            "study": "Map variants of a cell, and say which change is more than noise.",
             "empty": "Fill a bin with parts and pick them to the end.",
             "robust": "Say which grasps survive when bin, camera or tool are off.",
             "validate": "Test a bin map against real planning to real grasps.",
+        },
+    ),
+    **_section(
+        "Design",
+        {
+            "study": "Map variants of a cell, and say which change is more than noise.",
+            "place-robot": "Find where the arm should stand, for a bin that stays.",
         },
     ),
     **_section(

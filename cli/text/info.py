@@ -7,6 +7,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from reachmap.cli.text.base import base_lines
 from reachmap.cli.text.bin_map import bin_lines
 from reachmap.cli.text.evidence import (
     PAIRS_SHOWN,
@@ -20,6 +21,7 @@ from reachmap.cli.text.tables import fact_lines, table_lines
 from reachmap.maps.bytes.to_json import flat_json
 from reachmap.maps.format.placement import is_turn
 from reachmap.maps.robustness.summary import RobustnessSummary
+from reachmap.maps.summary.base import BaseSummary
 from reachmap.maps.summary.bin import BinSummary
 from reachmap.maps.summary.placement import CandidateSummary, PlacementSummary
 from reachmap.maps.summary.statistics import (
@@ -45,6 +47,8 @@ def info_text(info: ArtefactInfo) -> str:
         body = study_lines(summary)
     elif isinstance(summary, RobustnessSummary):
         body = robustness_lines(summary)
+    elif isinstance(summary, BaseSummary):
+        body = base_lines(summary)
     else:
         body = _placement_lines(summary)
     lines = [_headline(info), *_approximation_lines(info), *body, "", "Made from"]

@@ -130,7 +130,7 @@ class LoadedCell:
             q = {name: float(value) for name, value in scan_configuration_rad.items()}
             changed = ScanConfiguration(q_rad=q)
             cell = cell.model_copy(update={"scan_configuration": changed})
-        return self._with_cell(cell)
+        return self.with_cell(cell)
 
     def fillings(self) -> tuple[LoadedCell, ...]:
         """The cell for each level of the parts in its bin, which has no other layer.
@@ -154,9 +154,10 @@ class LoadedCell:
                 "bin_scan": spec.model_copy(update=levels),
             }
         )
-        return self._with_cell(changed)
+        return self.with_cell(changed)
 
-    def _with_cell(self, cell: Cell) -> LoadedCell:
+    def with_cell(self, cell: Cell) -> LoadedCell:
+        """Copy with another description, and its own sha256."""
         return dataclasses.replace(
             self,
             cell=cell,

@@ -13,7 +13,13 @@ import numpy as np
 from reachmap._typing import FloatArray
 from reachmap.cell.model.tool import FREE
 from reachmap.core.collision.bin_fit import BinFit
-from reachmap.core.collision.bodies import Load, bin_placements, build_geometry
+from reachmap.core.collision.bodies import (
+    Load,
+    bin_placements,
+    build_geometry,
+    world_placements,
+    world_shapes,
+)
 from reachmap.core.collision.checker import CollisionChecker
 from reachmap.core.kinematics.kinematics import Kinematics
 from reachmap.core.planning.motion import MotionChecker
@@ -65,7 +71,12 @@ class Scene:
 
     @classmethod
     def build(
-        cls, loaded: LoadedCell, *, with_bin: bool = True, bin_moves: bool = False
+        cls,
+        loaded: LoadedCell,
+        *,
+        with_bin: bool = True,
+        bin_moves: bool = False,
+        world_moves: bool = False,
     ) -> Scene:
         """Assemble a scene.
 
@@ -75,6 +86,8 @@ class Scene:
         with_bin : bool
         bin_moves : bool
             Whether :meth:`with_bin_of` will be used.
+        world_moves : bool
+            Whether :meth:`with_world_of` will be used.
 
         Raises
         ------
@@ -84,11 +97,13 @@ class Scene:
         cell = loaded.cell
         robot = RobotModel.from_cell(loaded)
         bodies = build_geometry(robot, loaded, with_bin=with_bin)
+        movable: dict[str, FloatArray] = {}
+        if bin_moves or world_moves:
+            movable |= bin_placements(robot, loaded)
+        if world_moves:
+            movable |= world_placements(robot, loaded)
         checker = CollisionChecker(
-            robot,
-            bodies,
-            cell.collision.safety_margin_m,
-            movable=bin_placements(robot, loaded) if bin_moves else (),
+            robot, bodies, cell.collision.safety_margin_m, movable=movable
         )
         motions = MotionChecker(
             checker,
@@ -179,6 +194,26 @@ class Scene:
         self.checker.move(bin_placements(self.robot, loaded))
         T_base_bin = loaded.cell.T_base_bin()
         return dataclasses.replace(self, loaded=loaded, T_base_bin=T_base_bin)
+
+    def with_world_of(self, loaded: LoadedCell) -> Scene:
+        """Move the bin and all that stands in the world, as :meth:`with_bin_of` does.
+
+        Parameters
+        ----------
+        loaded : LoadedCell
+            The same cell but for the poses of robot_base, the bin and bodies on the
+            world, and the sizes of those that are primitives.
+        """
+        robot = dataclasses.replace(
+            self.robot, T_world_base=loaded.cell.robot.base_pose.matrix()
+        )
+        self.checker.move(
+            bin_placements(robot, loaded) | world_placements(robot, loaded),
+            world_shapes(loaded),
+        )
+        return dataclasses.replace(
+            self, loaded=loaded, robot=robot, T_base_bin=loaded.cell.T_base_bin()
+        )
 
     def require_free_scan_configuration(self) -> None:
         """Refuse to work from a scan configuration that cannot be taken.

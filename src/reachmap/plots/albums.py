@@ -11,12 +11,14 @@ import numpy as np
 
 from reachmap._typing import FloatArray
 from reachmap.errors import SettingsError
+from reachmap.maps.base.record import BasePlacement
 from reachmap.maps.records import BinMap, BinPlacement, WorkspaceMap
 from reachmap.maps.robustness.record import Robustness
 from reachmap.maps.study.record import Study
 from reachmap.maps.summary.emptying import emptying_of
 from reachmap.maps.summary.statistics import are_independent
 from reachmap.plots.approach import draw_approach
+from reachmap.plots.base import draw_base
 from reachmap.plots.bin_map import (
     draw_clearance,
     draw_costs,
@@ -311,3 +313,11 @@ def robustness_album(record: Robustness) -> list[Picture | Table]:
             draw=partial(draw_robustness, record),
         )
     ]
+
+
+def base_album(
+    placement: BasePlacement, *, percent_map: PercentMap = "RdYlGn"
+) -> list[Picture | Table]:
+    """List the picture of a place of an arm."""
+    draw = partial(draw_base, placement, percent_map)
+    return [Picture(name="robot", title="Where the arm goes", draw=draw)]

@@ -16,7 +16,7 @@ def read_artefact_or_journal(path: Path) -> tuple[Artefact | Result, bool]:
 
     Returns
     -------
-    record : WorkspaceMap, BinMap, BinPlacement, Study or Robustness
+    record : WorkspaceMap, BinMap, BinPlacement or another result
     finished : bool
         Whether it was an artefact.
 

@@ -11,7 +11,14 @@ import numpy as np
 
 from reachmap.cell.loading import read_cell
 from reachmap.core.scene import Scene
-from reachmap.maps import BinMap, Status, read_placement, read_workspace_map
+from reachmap.maps import (
+    BinMap,
+    Status,
+    artefact_kind,
+    read_placement,
+    read_workspace_map,
+)
+from reachmap.maps.base.format import read_base
 from reachmap.maps.summary.clearance import clearance_shares
 from reachmap.runtime.job import Work
 from reachmap.runtime.options import IN_PROCESS, RunOptions
@@ -52,8 +59,8 @@ def bin_scan(
     Parameters
     ----------
     placement : Path or None
-        Artefact of place-bin, which holds the cell with its bin pose and scan
-        configuration. None takes the bin where the cell has it.
+        Artefact of place-bin or place-robot, which holds the cell with its bin pose
+        and scan configuration. None takes the bin where the cell has it.
     output : Path
         The artefact to write.
     cell : str, optional
@@ -127,7 +134,11 @@ def load_placed_cell(
     if cell is not None or (placement is None and workspace is None):
         return read_cell(cell or "ur5-eye-in-hand", overrides), ""
     if placement is not None:
-        placed = read_placement(placement)
+        placed = (
+            read_base(placement)
+            if artefact_kind(placement) == "base_placement"
+            else read_placement(placement)
+        )
         loaded = cell_of_artefact(placed.provenance, str(placement), overrides)
         return loaded, placed.stamp.content_sha256
     assert workspace is not None

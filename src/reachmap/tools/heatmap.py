@@ -14,12 +14,13 @@ from reachmap.maps import (
     read_placement,
     read_workspace_map,
 )
+from reachmap.maps.base.format import read_base
+from reachmap.maps.format.registry import Artefact, Result
 from reachmap.maps.records import BinMap, BinPlacement, WorkspaceMap
 from reachmap.maps.robustness.format import read_robustness
-from reachmap.maps.robustness.record import Robustness
 from reachmap.maps.study.format import read_study
-from reachmap.maps.study.record import Study
 from reachmap.plots.albums import (
+    base_album,
     bin_album,
     placement_album,
     robustness_album,
@@ -33,7 +34,7 @@ from reachmap.ranking.lookup.columns import columns_of
 from reachmap.ranking.lookup.settings import RankSettings
 from reachmap.ranking.lookup.table import table_from_bin_map
 
-NO_LEVELS = ("bin_map", "bin_placement", "study", "robustness")
+NO_LEVELS = ("bin_map", "bin_placement", "base_placement", "study", "robustness")
 
 logger = logging.getLogger(__name__)
 
@@ -50,7 +51,7 @@ def heatmap(
     tables: bool = False,
     overwrite: bool = False,
 ) -> tuple[Path, ...]:
-    """Draw a workspace map, a bin map, a placement, a study or a robustness.
+    """Draw an artefact of any kind.
 
     Parameters
     ----------
@@ -85,7 +86,7 @@ def heatmap(
         )
     if workspace is not None and found != "bin_placement":
         raise SettingsError(f"{artefact}: --workspace is for placements")
-    record: WorkspaceMap | BinMap | BinPlacement | Study | Robustness
+    record: Artefact | Result
     items: list[Picture | Table]
     if found == "bin_map":
         record = read_bin_map(artefact)
@@ -94,11 +95,14 @@ def heatmap(
         record = read_placement(artefact)
         below = _map_below(artefact, record, workspace)
         items = placement_album(record, below, percent_map=percent_map, tables=tables)
-    elif tables and found in ("study", "robustness"):
+    elif tables and found in NO_LEVELS:
         raise SettingsError(f"{artefact}: --csv is for maps (info --json has all)")
     elif found == "robustness":
         record = read_robustness(artefact)
         items = robustness_album(record)
+    elif found == "base_placement":
+        record = read_base(artefact)
+        items = base_album(record, percent_map=percent_map)
     elif found == "study":
         record = read_study(artefact)
         items = study_album(record, percent_map=percent_map)

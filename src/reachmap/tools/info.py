@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeAlias
 
+from reachmap.maps.base.record import BasePlacement
 from reachmap.maps.bytes.to_json import json_ready
 from reachmap.maps.format.registry import Artefact, Result, kind_of
 from reachmap.maps.records import BinMap, WorkspaceMap
@@ -17,6 +18,7 @@ from reachmap.maps.robustness.summary import (
     summarise_robustness,
 )
 from reachmap.maps.study.record import Study
+from reachmap.maps.summary.base import BaseSummary, summarise_base
 from reachmap.maps.summary.bin import BinSummary, summarise_bin
 from reachmap.maps.summary.placement import PlacementSummary, summarise_placement
 from reachmap.maps.summary.study import StudySummary, summarise_study
@@ -24,7 +26,12 @@ from reachmap.maps.summary.workspace import WorkspaceSummary, summarise_workspac
 from reachmap.tools.artefacts import read_artefact_or_journal
 
 Summary: TypeAlias = (
-    WorkspaceSummary | BinSummary | PlacementSummary | StudySummary | RobustnessSummary
+    WorkspaceSummary
+    | BinSummary
+    | PlacementSummary
+    | BaseSummary
+    | StudySummary
+    | RobustnessSummary
 )
 
 
@@ -39,9 +46,10 @@ class ArtefactInfo:
         As in ``"bin_map"``.
     finished : bool
         False for the journal of a run that goes on or was interrupted.
-    record : WorkspaceMap, BinMap, BinPlacement, Study or Robustness
-    summary : WorkspaceSummary, BinSummary, PlacementSummary, StudySummary or
-        RobustnessSummary
+    record : record
+        Of its kind.
+    summary : summary
+        Of its kind.
     """
 
     path: Path
@@ -101,6 +109,8 @@ def info(path: Path) -> ArtefactInfo:
         summary = summarise_study(record)
     elif isinstance(record, Robustness):
         summary = summarise_robustness(record)
+    elif isinstance(record, BasePlacement):
+        summary = summarise_base(record)
     else:
         summary = summarise_placement(record)
     return ArtefactInfo(

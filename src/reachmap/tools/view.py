@@ -11,8 +11,9 @@ from pathlib import Path
 
 from reachmap.cell.loading import SUFFIXES, LoadedCell, read_cell, shipped_cells
 from reachmap.errors import SettingsError
+from reachmap.maps.base.record import BasePlacement
 from reachmap.maps.bytes.publish import check_outputs, publish
-from reachmap.maps.format.registry import Artefact, read_artefact
+from reachmap.maps.format.registry import Artefact, kind_of, read_artefact
 from reachmap.maps.records import BinMap
 from reachmap.maps.robustness.record import Robustness
 from reachmap.maps.study.record import Study
@@ -128,8 +129,9 @@ def _read(source: Path) -> tuple[Artefact | None, LoadedCell]:
     if source.suffix in SUFFIXES or str(source) in shipped_cells():
         return None, read_cell(str(source))
     record = read_artefact(source)
-    if isinstance(record, Study | Robustness):
-        raise SettingsError(f"{source}: a study has no view (heatmap draws it)")
+    if isinstance(record, Study | Robustness | BasePlacement):
+        kind = kind_of(record).replace("_", " ")
+        raise SettingsError(f"{source}: a {kind} has no view (heatmap draws it)")
     return record, cell_of_artefact(record.provenance, str(source))
 
 

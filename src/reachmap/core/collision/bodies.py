@@ -95,6 +95,24 @@ Load = Literal["empty", "lifted", "carried"]
 """What hangs on the tool: nothing, the part still on what it lay on, or the part."""
 
 
+def world_placements(robot: RobotModel, loaded: LoadedCell) -> dict[str, FloatArray]:
+    """Poses (4, 4) of the bodies on the world in the model's root frame, by name."""
+    return {
+        body.name: np.asarray(robot.T_root_world @ body.pose.matrix())
+        for body in loaded.cell.bodies
+        if body.attach_to == "world"
+    }
+
+
+def world_shapes(loaded: LoadedCell) -> dict[str, Any]:
+    """Coal shapes of the primitives on the world, by name."""
+    return {
+        body.name: coal_shape(body.shape)
+        for body in loaded.cell.bodies
+        if body.attach_to == "world" and body.shape.mesh is None
+    }
+
+
 def build_geometry(
     robot: RobotModel, loaded: LoadedCell, *, with_bin: bool, load: Load = "empty"
 ) -> BodyGeometry:

@@ -133,12 +133,22 @@ class CollisionChecker:
             for step in LADDER_M
         ]
 
-    def move(self, T_root_body: Mapping[str, FloatArray]) -> None:
-        """Put movable bodies elsewhere, by name and pose (4, 4)."""
+    def move(
+        self,
+        T_root_body: Mapping[str, FloatArray],
+        shapes: Mapping[str, Any] | None = None,
+    ) -> None:
+        """Put movable bodies elsewhere, by name and pose (4, 4).
+
+        Primitives may have another size there: ``shapes`` are those of coal, by name.
+        """
         for name, T in T_root_body.items():
             placement = pin.SE3(np.ascontiguousarray(T))
             for geometry in (self.bodies, self.hulls):
-                geometry.geometryObjects[self._movable[name]].placement = placement
+                body = geometry.geometryObjects[self._movable[name]]
+                body.placement = placement
+                if shapes and name in shapes:
+                    body.geometry = shapes[name]
         self._start_engine()
 
     def _broadphase_with(self, geometry: Any, margins: FloatArray) -> tuple[Any, Any]:

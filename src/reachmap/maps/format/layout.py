@@ -131,6 +131,7 @@ KINDS: Final[dict[str, Kind]] = {
     "workspace_map": Kind("workspace map", "reachmap workspace-scan"),
     "bin_map": Kind("bin map", "reachmap bin-scan"),
     "bin_placement": Kind("bin placement", "reachmap place-bin"),
+    "base_placement": Kind("base placement", "reachmap place-robot"),
     "study": Kind("study", "reachmap study"),
     "robustness": Kind("robustness of a bin map", "reachmap robust"),
 }

@@ -6,6 +6,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Final, TypeAlias
 
+from reachmap.maps.base.format import BASE, base_from_tree
+from reachmap.maps.base.record import BasePlacement
 from reachmap.maps.bytes.tree import Tree
 from reachmap.maps.format.assembly import provenance_of
 from reachmap.maps.format.bin import BIN, bin_map_from_tree
@@ -20,13 +22,14 @@ from reachmap.maps.study.format import STUDY, study_from_tree
 from reachmap.maps.study.record import Study
 
 Artefact: TypeAlias = WorkspaceMap | BinMap | BinPlacement
-Result: TypeAlias = Study | Robustness
-"""What is found out about maps; no map itself."""
+Result: TypeAlias = Study | Robustness | BasePlacement
+"""What is found out about maps and cells; no map itself."""
 
 _RECORDS: Final[dict[str, Callable[[Tree, Path], Artefact | Result]]] = {
     "workspace_map": workspace_map_from_tree,
     "bin_map": bin_map_from_tree,
     "bin_placement": placement_from_tree,
+    "base_placement": base_from_tree,
     "study": study_from_tree,
     "robustness": robustness_from_tree,
 }
@@ -52,11 +55,14 @@ def kind_of(record: Artefact | Result) -> str:
         return "study"
     if isinstance(record, Robustness):
         return "robustness"
+    if isinstance(record, BasePlacement):
+        return "base_placement"
     return "bin_map" if isinstance(record, BinMap) else "bin_placement"
 
 
 LAYOUTS: Final[dict[str, Layout]] = {
-    layout.kind: layout for layout in (WORKSPACE, BIN, PLACEMENT, STUDY, ROBUSTNESS)
+    layout.kind: layout
+    for layout in (WORKSPACE, BIN, PLACEMENT, BASE, STUDY, ROBUSTNESS)
 }
 """Kind to format."""
 

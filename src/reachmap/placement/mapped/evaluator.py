@@ -11,8 +11,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from reachmap._typing import BoolArray, FloatArray
-from reachmap.core.scene import Scene
-from reachmap.placement.mapped.exact import ALWAYS, NEVER, PlacedScene, Pose, PoseScore
+from reachmap.placement.mapped.exact import (
+    ALWAYS,
+    BIN_PLACING,
+    NEVER,
+    PlacedScene,
+    Placing,
+    Pose,
+    PoseScore,
+)
 from reachmap.placement.mapped.imaging import UNSEEN, imaging_configurations
 from reachmap.placement.mapped.sample import COARSE, Grid, Sample, sample_of
 from reachmap.runtime.executors import open_pool
@@ -38,11 +45,14 @@ class Evaluation:
         None if the bound is not above what was asked for, or for a reason.
     reason : str
         Why there is no scan configuration to start from, or "".
+    reachable_share : float
+        Share of test frames with an IK solution [percent].
     """
 
     bound: float
     score: PoseScore | None
     reason: str = ""
+    reachable_share: float = np.nan
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -110,7 +120,8 @@ class Evaluator:
             the bin.
         above : float or sequence of float
             A pose whose bound is not above this need not be scored [percent]; of all,
-            or of each.
+            or of each. With NEVER there are bounds alone, and no scan configuration
+            is looked for.
         enough : float
             A score from which on no more is looked for [percent].
         grid : (int, int, int)
@@ -156,6 +167,7 @@ def open_evaluator(
     options: RunOptions,
     *,
     progress: Progress,
+    placing: Placing = BIN_PLACING,
 ) -> Iterator[Evaluator]:
     """Start workers that score poses, and stop them afterwards.
 
@@ -166,8 +178,11 @@ def open_evaluator(
         See :func:`reachmap.placement.mapped.sample.open_frames`.
     options : RunOptions
     progress : Progress
+    placing : Placing
+        What is placed.
     """
-    job = Job(function=evaluate_unit, prepare=Prepared, context=(loaded, is_open))
+    context = (loaded, is_open, placing)
+    job = Job(function=evaluate_unit, prepare=Prepared, context=context)
     with open_pool(options) as pool:
         yield Evaluator(pool, job, progress)
         progress.end()
@@ -178,24 +193,25 @@ class Prepared:
 
     Parameters
     ----------
-    context : (LoadedCell, bool array)
+    context : (LoadedCell, bool array, Placing)
         See :func:`open_evaluator`.
     """
 
-    def __init__(self, context: tuple[LoadedCell, BoolArray]) -> None:
-        loaded, self._is_open = context
-        self._scene = Scene.build(loaded, with_bin=True, bin_moves=True)
+    def __init__(self, context: tuple[LoadedCell, BoolArray, Placing]) -> None:
+        loaded, self._is_open, self._placing = context
+        self._scene = self._placing.scene(loaded)
         self._samples: dict[Grid, Sample] = {}
         self._at: tuple[Grid, Pose] | None = None
         self._placed: PlacedScene | None = None
 
     def scene_at(self, pose: Pose, grid: Grid) -> PlacedScene:
-        """Scene with the bin at a pose."""
+        """Scene with what is placed at a pose."""
         if self._placed is None or self._at != (grid, pose):
             if grid not in self._samples:
                 cell = self._scene.loaded.cell
                 self._samples[grid] = sample_of(cell, grid, self._is_open)
-            self._placed = PlacedScene(self._scene, pose, self._samples[grid])
+            sample = self._samples[grid]
+            self._placed = PlacedScene(self._scene, pose, sample, self._placing)
             self._at = (grid, pose)
         return self._placed
 
@@ -204,14 +220,19 @@ def evaluate_unit(prepared: Prepared, unit: tuple[Request, float]) -> dict[str, 
     """Score one pose, unless its bound is not above a number [percent]."""
     request, above = unit
     placed = prepared.scene_at(request.pose, request.grid)
+    reachable = placed.reachable_share
+    if above >= NEVER:
+        bound = placed.bound
+        return {"bound": bound, "reason": "", "score": None, "reachable": reachable}
     q, reason = start_of(placed, np.array(request.q) if request.q else None)
     if q is None:
-        return {"bound": 0.0, "reason": reason, "score": None}
+        return {"bound": 0.0, "reason": reason, "score": None, "reachable": reachable}
     bound, score = placed.score_from(q, above=above, enough=request.enough)
     return {
         "bound": bound,
         "reason": "",
         "score": None if score is None else dataclasses.asdict(score),
+        "reachable": reachable,
     }
 
 
@@ -243,4 +264,5 @@ def _evaluation(content: dict[str, Any]) -> Evaluation:
         bound=content["bound"],
         score=None if score is None else PoseScore(**score),
         reason=content["reason"],
+        reachable_share=content["reachable"],
     )

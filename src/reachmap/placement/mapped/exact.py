@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
@@ -22,6 +23,9 @@ from reachmap.core.scene import Scene
 from reachmap.geometry import axis_vector, yaw_transform
 from reachmap.placement.mapped.sample import Sample, rolls_of
 from reachmap.sampling.frames import approach_distance_m
+
+if TYPE_CHECKING:
+    from reachmap.cell.loading import LoadedCell
 
 # Hundreds of poses are compared: a plan has a quarter of the checks that it has for a
 # map, and no second opinion.
@@ -71,15 +75,49 @@ def bin_at(cell: Cell, pose: Pose) -> FloatArray:
     return np.asarray(cell.T_base_level() @ yaw_transform(*pose))
 
 
+class Placing(Protocol):
+    """What a pose is a pose of, and how a scene gets there."""
+
+    def cell_at(self, loaded: LoadedCell, pose: Pose) -> LoadedCell:
+        """The cell as it is with the pose; CellError where it cannot be."""
+
+    def scene(self, loaded: LoadedCell) -> Scene:
+        """A scene that :meth:`at` can be asked of."""
+
+    def at(self, scene: Scene, loaded: LoadedCell) -> Scene:
+        """A scene of a cell of :meth:`cell_at`; ``scene`` is of no use any more."""
+
+
+@dataclass(frozen=True, slots=True)
+class BinPlacing:
+    """The pose is that of the bin in the level frame."""
+
+    def cell_at(self, loaded: LoadedCell, pose: Pose) -> LoadedCell:
+        """See :class:`Placing`."""
+        return loaded.with_changes(bin_pose=bin_at(loaded.cell, pose))
+
+    def scene(self, loaded: LoadedCell) -> Scene:
+        """See :class:`Placing`."""
+        return Scene.build(loaded, with_bin=True, bin_moves=True)
+
+    def at(self, scene: Scene, loaded: LoadedCell) -> Scene:
+        """See :class:`Placing`."""
+        return scene.with_bin_of(loaded)
+
+
+BIN_PLACING = BinPlacing()
+
+
 class PlacedScene:
-    """A cell with its bin at one pose, and what its test frames offer.
+    """A cell with its bin, or its arm, at one pose, and what its test frames offer.
 
     Parameters
     ----------
     scene : Scene
-        With a bin that can be moved; must not be used by anybody else meanwhile.
+        Of the placing; must not be used by anybody else meanwhile.
     pose : (x, y, z [m], yaw [rad])
     sample : Sample
+    placing : Placing
 
     Attributes
     ----------
@@ -94,10 +132,16 @@ class PlacedScene:
         Frame of each, rising.
     """
 
-    def __init__(self, scene: Scene, pose: Pose, sample: Sample) -> None:
-        changed = scene.loaded.with_changes(bin_pose=bin_at(scene.loaded.cell, pose))
+    def __init__(
+        self,
+        scene: Scene,
+        pose: Pose,
+        sample: Sample,
+        placing: Placing = BIN_PLACING,
+    ) -> None:
+        changed = placing.cell_at(scene.loaded, pose)
         self.pose = pose
-        self.scene = scene.with_bin_of(changed)
+        self.scene = placing.at(scene, changed)
         cell = changed.cell
         self.T = self.scene.T_base_bin @ sample.T_bin_tcp
         rolls = rolls_of(cell)
@@ -132,6 +176,11 @@ class PlacedScene:
     def bound(self) -> float:
         """What frames with a free configuration count for; no score is higher [%]."""
         return 100.0 * float(self._sample.weight @ (np.diff(self._begin) > 0))
+
+    @property
+    def reachable_share(self) -> float:
+        """Share of test frames with an IK solution [percent]."""
+        return 100.0 * float(self._sample.share @ self._has_ik)
 
     def score_from(
         self, q: FloatArray, *, above: float = ALWAYS, enough: float = NEVER
@@ -240,7 +289,7 @@ class PlacedScene:
         return PoseScore(
             score=100.0 * float(sample.weight @ found),
             worst_point=100.0 * sample.worst_point(found),
-            reachable_share=100.0 * float(sample.share @ self._has_ik),
+            reachable_share=self.reachable_share,
             path_length_rad=(
                 float(np.average(length[found], weights=sample.share[found]))
                 if found.any()

@@ -17,23 +17,29 @@ SLACK = 1e-9
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Region:
-    """Ranges of the bin's pose: x, y, z of the inner bottom [m], yaw [rad].
+    """Ranges of a pose: x, y, z [m], yaw [rad].
 
-    They are in the cell's level frame, see :meth:`Cell.T_base_level`.
+    The bin's are those of the inner bottom in the cell's level frame, see
+    :meth:`Cell.T_base_level`.
 
     Attributes
     ----------
     low, high : array, shape (4,)
         ``low == high`` where a value is fixed.
+    period_rad : float
+        Turn after which all is as before; half a turn for a bin.
     """
 
     low: FloatArray
     high: FloatArray
+    period_rad: float = np.pi
 
     def outside(self, pose: FloatArray) -> str:
         """Name of the first value of a pose (4,) that is outside, or ""."""
         for k, name in enumerate(AXES):
-            if not _is_inside(name, float(pose[k]), self.low[k], self.high[k]):
+            value = float(pose[k])
+            low, high = self.low[k], self.high[k]
+            if not _is_inside(name, value, low, high, self.period_rad):
                 return name
         return ""
 
@@ -90,11 +96,12 @@ def region_of(
     )
 
 
-def _is_inside(name: str, value: float, low: float, high: float) -> bool:
+def _is_inside(
+    name: str, value: float, low: float, high: float, period: float = np.pi
+) -> bool:
     if name == "yaw":
-        # A bin turned by half a turn is the same bin.
         middle = (low + high) / 2
-        value = middle + (value - middle + np.pi / 2) % np.pi - np.pi / 2
+        value = middle + (value - middle + period / 2) % period - period / 2
     return low - SLACK <= value <= high + SLACK
 
 

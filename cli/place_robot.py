@@ -1,0 +1,200 @@
+"""``reachmap place-robot``: where the arm should stand."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+
+import click
+
+from reachmap.cli.options import (
+    INPUT_FILE,
+    OUTPUT_PATH,
+    cell_argument,
+    check_workers,
+    compose,
+    executor_option,
+    json_option,
+    output_option,
+    overwrite_option,
+    progress_option,
+    seed_option,
+    set_option,
+    unused,
+    workers_option,
+)
+from reachmap.cli.place_bin import parse_fixed
+
+places_options = compose(
+    click.option(
+        "--mount",
+        "mountings",
+        multiple=True,
+        metavar="HOW",
+        help="floor, wall, ceiling, or how far the base leans [deg]; by default as the "
+        "cell has it. Repeatable: all are compared.",
+    ),
+    click.option(
+        "--rail",
+        default="",
+        metavar="JOINT",
+        help="Look for the position of this locked prismatic joint instead.",
+    ),
+    click.option(
+        "--rail-range",
+        nargs=2,
+        type=float,
+        metavar="P0 P1",
+        help="Keep the joint of --rail between these positions [m].",
+    ),
+    click.option(
+        "--fix",
+        "fixed",
+        multiple=True,
+        callback=parse_fixed,
+        metavar="NAME=VALUE",
+        help="Keep x, y or z [m] or yaw [deg] of the base in the world. Repeatable.",
+    ),
+    click.option(
+        "--region",
+        nargs=4,
+        type=float,
+        metavar="X0 X1 Y0 Y1",
+        help="Keep the base in this rectangle of the world [m].",
+    ),
+    click.option(
+        "--heights",
+        nargs=2,
+        type=float,
+        metavar="Z0 Z1",
+        help="Keep the base between these heights [m]; default: 0.3 m up and down.",
+    ),
+    click.option(
+        "--moves",
+        multiple=True,
+        metavar="BODY",
+        help="A body on the world that goes with the base, besides those that may "
+        "touch it. Repeatable.",
+    ),
+    click.option(
+        "--stays",
+        multiple=True,
+        metavar="BODY",
+        help="A body that may touch the base, and stays where it is. Repeatable.",
+    ),
+)
+
+
+@click.command()
+@cell_argument
+@places_options
+@click.option(
+    "--arm",
+    "arms",
+    multiple=True,
+    type=INPUT_FILE,
+    metavar="FRAGMENT",
+    help="Another arm to compare: a YAML file with sections of a cell (robot, bodies, "
+    "scan_configuration, …) that take the place of the cell's. Repeatable.",
+)
+@click.option(
+    "--top",
+    type=click.IntRange(min=1, max=100),
+    default=3,
+    show_default=True,
+    metavar="N",
+    help="Different places to plan paths from.",
+)
+@click.option(
+    "--keep-scan-configuration",
+    is_flag=True,
+    help="Leave the cell's own scan configuration.",
+)
+@click.option(
+    "--picture",
+    type=OUTPUT_PATH,
+    metavar="PATH",
+    help="Draw the places there, too: .png or .svg.",
+)
+@output_option("robot.h5")
+@set_option
+@seed_option
+@workers_option
+@executor_option
+@overwrite_option
+@progress_option
+@json_option
+def command(
+    cell: str,
+    mountings: tuple[str, ...],
+    rail: str,
+    rail_range: tuple[float, float] | None,
+    fixed: dict[str, float],
+    region: tuple[float, float, float, float] | None,
+    heights: tuple[float, float] | None,
+    moves: tuple[str, ...],
+    stays: tuple[str, ...],
+    arms: tuple[Path, ...],
+    top: int,
+    keep_scan_configuration: bool,
+    picture: Path | None,
+    output: Path,
+    overrides: tuple[str, ...],
+    seed: int | None,
+    workers: int,
+    executor: str,
+    overwrite: bool,
+    progress: bool,
+    as_json: bool,
+) -> None:
+    """Find where the arm should stand, for a bin that stays.
+
+    CELL is a shipped cell by name, or the path of a cell file. The bin and the bodies
+    on the world stay; what may touch the arm's base, as a pedestal does, goes with it.
+    Every place is judged by inverse kinematics and collision, paths are planned from
+    the best. The result holds the cell with its new base, for bin-scan.
+
+    Example: reachmap place-robot ur5-eye-in-hand --heights -0.2 0.3 --picture robot.png
+    """
+    if not rail:
+        unused("rail_range", because="needs --rail")
+    check_workers(executor)
+    from reachmap.cli.text.base import base_lines
+    from reachmap.maps.bytes.to_json import json_ready
+    from reachmap.maps.summary.base import summarise_base
+    from reachmap.runtime.options import RunOptions
+    from reachmap.tools.place_robot import RobotChoice, place_robot
+
+    limits = {} if region is None else {"x": region[:2], "y": region[2:]}
+    limits |= {} if heights is None else {"z": heights}
+    limits |= {} if rail_range is None else {"x": rail_range}
+    placement = place_robot(
+        cell,
+        output,
+        choice=RobotChoice(
+            mountings=mountings,
+            rail=rail,
+            limits=limits,
+            fixed=fixed,
+            moves=moves,
+            stays=stays,
+            arms=arms,
+            top=top,
+            keep_scan_configuration=keep_scan_configuration,
+        ),
+        overrides=overrides,
+        seed=seed,
+        picture=picture,
+        run=RunOptions(
+            workers=workers,
+            executor=executor,
+            overwrite=overwrite,
+            quiet=not progress,
+        ),
+    )
+    summary = summarise_base(placement)
+    if as_json:
+        click.echo(json.dumps(json_ready({"output": str(output)} | asdict(summary))))
+    else:
+        click.echo("\n".join([*base_lines(summary), str(output)]))

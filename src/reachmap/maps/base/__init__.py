@@ -1,0 +1,1 @@
+"""Places of the arm for a bin that stands: record, and format."""

@@ -1,0 +1,249 @@
+"""Places of the arm: record to file and back."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from reachmap.maps.base.record import BasePlacement
+from reachmap.maps.bytes.tree import Tree
+from reachmap.maps.format.assembly import assemble, provenance_of, run_of, stamp_of
+from reachmap.maps.format.checks import check_pose, require
+from reachmap.maps.format.layout import JOINT, PERCENT, SCAN, Layout, Variable, index
+from reachmap.maps.format.placement import is_turn
+from reachmap.maps.format.store import load, store
+
+PERCENTAGES: Final = {
+    "score": "Mean path reachability of the bin; a bound where exact is 0.",
+    "score_error": "Standard error of score, from the number of test grasps.",
+    "worst_point": "Path reachability of the worst point of the pick volume.",
+    "reachable_share": "Share of test grasps with inverse kinematics.",
+}
+POSES: Final = {
+    "base_pose": "T_world_base of the chosen place.",
+    "bin_pose": "T_world_bin, which stays.",
+    "T_world_level": "Upright frame at the bin that the search was done in.",
+}
+_ROWS: Final = ("chosen", "runner_up", "present")
+_ARRAYS: Final = (
+    *POSES, "scan_configuration", "best_of", "arm", "mounting", "candidate_position",
+    "candidate_yaw", *PERCENTAGES, "exact",
+)  # fmt: skip
+
+
+def check_base(tree: Tree) -> list[str]:
+    """Check rows, reasons against missing scores, and bounds."""
+    score, reason = tree.array("score"), tree.array("reason")
+    problems = [
+        *(text for name in POSES for text in check_pose(tree.array(name))),
+        *require(
+            np.isnan(score) == (reason != 0),
+            "reason must be given exactly where a candidate has no score",
+        ),
+        *require(
+            np.isnan(score) | (score <= tree.array("reachable_share") + 1e-6),
+            "score must not exceed reachable_share",
+        ),
+        *require(
+            tree.array("best_of") < len(score), "best_of must be rows of the candidates"
+        ),
+    ]
+    for name, least in (("chosen", 0), ("runner_up", -1), ("present", -1)):
+        row = tree.attributes.get(name)
+        if not isinstance(row, int) or not least <= row < len(score):
+            problems.append(
+                f"the root attribute {name} must be a row of the candidates"
+            )
+    if not problems:
+        chosen = tree.attributes["chosen"]
+        place = tree.array("candidate_position")[chosen]
+        on_rail = bool(tree.attributes["rail"])
+        if not on_rail and not np.allclose(
+            place, tree.array("base_pose")[:3, 3], atol=1e-6
+        ):
+            problems.append("base_pose must be that of the chosen candidate")
+        if not tree.array("exact")[chosen]:
+            problems.append("the chosen candidate must be exact")
+    return problems
+
+
+def _of_candidate(path: str, dtype: str, units: str, meaning: str, **more: Any) -> Any:
+    return Variable(
+        path=path,
+        dims=("candidate",),
+        dtype=dtype,
+        units=units,
+        meaning=meaning,
+        **more,
+    )
+
+
+BASE: Final = Layout(
+    kind="base_placement",
+    check=check_base,
+    title="Where the arm goes in a robot cell",
+    signal="score",
+    axes=("candidate",),
+    attributes={
+        "chosen": "Row of the chosen candidate.",
+        "runner_up": "Row of the best place elsewhere or of another arm; -1: none.",
+        "present": "Row of the cell as it is, -1: none.",
+        "rail": "Locked joint whose position is chosen, in place of a pose.",
+        "joint_names": "Names of the joints of the chosen arm, in order.",
+        "arms": "Arms that were compared.",
+        "mountings": "Mountings that were compared.",
+        "reasons": "Reasons for excluding a candidate; the first is the empty one.",
+    },
+    variables=(
+        index("candidate", "Places that were considered."),
+        JOINT,
+        index("pose_row", "Rows of a homogeneous matrix."),
+        index("pose_column", "Columns of a homogeneous matrix."),
+        index("xyz", "Coordinates x, y, z."),
+        index("arm_name", "Arms.", labels="arms"),
+        index("mounting_name", "Mountings.", labels="mountings"),
+        index("shift", "Directions of shift_margin.", labels="shift_directions"),
+        index("turn", "Directions of turn_margin.", labels="turn_directions"),
+        *(
+            Variable(
+                path=name,
+                dims=("pose_row", "pose_column"),
+                dtype="f8",
+                units="m",
+                meaning=f"{text} The rotation block has no unit.",
+                frame="world",
+            )
+            for name, text in POSES.items()
+        ),
+        SCAN,
+        Variable(
+            path="best_of",
+            dims=("arm_name", "mounting_name"),
+            dtype="i4",
+            units="1",
+            meaning="Best candidate of each arm and mounting, -1: none.",
+            low=-1,
+        ),
+        _of_candidate("arm", "i4", "1", "Arm.", low=0, labels="arms", is_index=True),
+        _of_candidate(
+            "mounting", "i4", "1", "Mounting.", low=0, labels="mountings", is_index=True
+        ),
+        Variable(
+            path="candidate_position",
+            dims=("candidate", "xyz"),
+            dtype="f8",
+            units="m",
+            meaning="Place of robot_base; on a rail the joint's position, and zeros.",
+            frame="world",
+        ),
+        _of_candidate(
+            "candidate_yaw",
+            "f8",
+            "rad",
+            "Heading of the base about the vertical.",
+            frame="world",
+        ),
+        *(
+            _of_candidate(name, "f8", meaning=meaning, nan=True, **PERCENT)
+            for name, meaning in PERCENTAGES.items()
+        ),
+        _of_candidate(
+            "exact", "u1", "1", "1 where paths were planned, 0: a bound.", is_flag=True
+        ),
+        _of_candidate(
+            "reason",
+            "i4",
+            "1",
+            "Why the candidate is excluded, an index into reasons; 0: it is not.",
+            low=0,
+            labels="reasons",
+            is_index=True,
+        ),
+        *(
+            Variable(
+                path=f"{name}_margin",
+                dims=(name,),
+                dtype="f8",
+                units=units,
+                meaning="How far the base may be off before the score drops 5 points.",
+                low=0.0,
+            )
+            for name, units in (("shift", "m"), ("turn", "rad"))
+        ),
+    ),
+)
+
+
+def write_base(path: Path, record: BasePlacement, overwrite: bool = False) -> str:
+    """Write a place of the arm; see :func:`~reachmap.maps.format.store.store`."""
+    return store(path, tree_from_base(record), BASE, overwrite=overwrite)
+
+
+def tree_from_base(record: BasePlacement) -> Tree:
+    """Everything that the file will hold."""
+    reasons = ("", *sorted(set(record.reason) - {""}))
+    shift = {k: v for k, v in record.margin.items() if not is_turn(k)}
+    turn = {k: v for k, v in record.margin.items() if is_turn(k)}
+    arrays: dict[str, Any] = {name: getattr(record, name) for name in _ARRAYS}
+    arrays |= {
+        "reason": np.array([reasons.index(text) for text in record.reason], np.int64),
+        "shift_margin": np.array(list(shift.values()), float),
+        "turn_margin": np.array(list(turn.values()), float),
+    }
+    rows = {name: int(getattr(record, name)) for name in _ROWS}
+    return assemble(
+        BASE,
+        arrays=arrays,
+        attributes={**rows, "rail": record.rail},
+        labels={
+            "joint_names": record.joint_names,
+            "arms": record.arms,
+            "mountings": record.mountings,
+            "reasons": reasons,
+            "shift_directions": tuple(shift),
+            "turn_directions": tuple(turn),
+        },
+        stamp=record.stamp,
+        provenance=record.provenance,
+        run=record.run,
+    )
+
+
+def read_base(path: Path) -> BasePlacement:
+    """Read a place of the arm; everything about it is checked.
+
+    Raises
+    ------
+    MapFileError
+        The file is missing, damaged, or something else.
+    """
+    tree, _ = load(path, BASE)
+    return base_from_tree(tree, path)
+
+
+def base_from_tree(tree: Tree, path: Path) -> BasePlacement:
+    """Turn a checked tree into a record; ``path`` is named in messages."""
+    fields: dict[str, Any] = {name: tree.array(name) for name in _ARRAYS}
+    fields |= {name: int(tree.attributes[name]) for name in _ROWS}
+    fields |= {
+        name: tuple(tree.attributes[name])
+        for name in ("joint_names", "arms", "mountings")
+    }
+    margin: dict[str, float] = {}
+    for name in ("shift", "turn"):
+        directions = tree.leaves[name].attributes[f"{name}_directions"]
+        margin |= dict(
+            zip(directions, tree.array(f"{name}_margin").tolist(), strict=True)
+        )
+    reasons = tree.attributes["reasons"]
+    return BasePlacement(
+        **fields,
+        rail=str(tree.attributes["rail"]),
+        reason=tuple(str(reasons[code]) for code in tree.array("reason")),
+        margin=margin,
+        stamp=stamp_of(tree),
+        provenance=provenance_of(tree, path),
+        run=run_of(tree, path),
+    )

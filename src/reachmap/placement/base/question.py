@@ -1,0 +1,132 @@
+"""What is asked about the place of an arm, and what can be said of single poses."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from reachmap._typing import BoolArray, FloatArray
+from reachmap.errors import CellError
+from reachmap.placement.base.fit import BaseFit
+from reachmap.placement.base.mounting import AnyMounting
+from reachmap.placement.mapped.candidates import Candidate
+from reachmap.placement.mapped.evaluator import Evaluator
+from reachmap.placement.mapped.exact import ALWAYS, NEVER, PlacedScene, Pose, PoseScore
+from reachmap.placement.mapped.imaging import imaging_configurations
+from reachmap.placement.mapped.sample import THIN, Grid, sample_of
+from reachmap.placement.predicted.region import Region
+
+if TYPE_CHECKING:
+    from reachmap.cell.loading import LoadedCell
+    from reachmap.core.scene import Scene
+
+# Two bases this far apart stand in different places [m].
+DIFFERENT_PLACE_M = 0.2
+# Frames of a prediction: few, for hundreds of places are looked at.
+SPARSE: Grid = (3, 3, 3)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class BaseQuestion:
+    """What is asked: an arm, how it is mounted, and where its base may stand.
+
+    Attributes
+    ----------
+    loaded : LoadedCell
+        Its world is the level frame, see :func:`reachmap.cell.base_pose.level_frame`.
+    mounting : Mounting or RailMounting
+    is_open : bool array, shape (layers, y, x, orientations)
+        See :func:`reachmap.placement.mapped.sample.open_frames`.
+    region : Region
+    own : pose
+        Where the cell has the base.
+    scene : Scene
+        Of the mounting; what uses it moves its world.
+    scan_configuration : array, shape (dof,)
+        The cell's own [rad].
+    keep_scan : bool
+    fit : BaseFit or None
+        None where nothing but the arm moves.
+    evaluator : Evaluator
+    """
+
+    loaded: LoadedCell
+    mounting: AnyMounting
+    is_open: BoolArray
+    region: Region
+    own: Pose
+    scene: Scene
+    scan_configuration: FloatArray
+    keep_scan: bool
+    fit: BaseFit | None
+    evaluator: Evaluator
+
+    def reason_against(self, pose: Pose) -> str:
+        """Why the base cannot stand at a pose, or ""."""
+        outside = self.region.outside(np.array(pose))
+        return f"{outside} is outside the region" if outside else self.contact(pose)
+
+    def contact(self, pose: Pose) -> str:
+        """What the base would meet, or ""."""
+        return "" if self.fit is None else self.fit.reason_against(pose)
+
+    def can_be_imaged(self, pose: Pose) -> bool:
+        """Whether some scan configuration images the bin; asked where it is chosen."""
+        if self.keep_scan:
+            return True
+        return next(imaging_configurations(self.scene_at(pose)), None) is not None
+
+    def is_possible(self, pose: Pose, q: FloatArray) -> bool:
+        """Whether the arm can be at a configuration with its base at a pose."""
+        if self.contact(pose):
+            return False
+        try:
+            return self.scene_at(pose).checker.is_free(q)
+        except CellError:
+            return False
+
+    def scene_at(self, pose: Pose) -> Scene:
+        """The scene with the base at a pose."""
+        return self.mounting.at(self.scene, self.mounting.cell_at(self.loaded, pose))
+
+    def placed(self, pose: Pose) -> PlacedScene:
+        """The scene with the base at a pose, and what its test frames offer."""
+        sample = sample_of(self.loaded.cell, THIN, self.is_open)
+        return PlacedScene(self.scene, pose, sample, self.mounting)
+
+    @property
+    def start(self) -> FloatArray | None:
+        """Scan configuration that poses are mapped from, None if it is chosen later."""
+        return self.scan_configuration if self.keep_scan else None
+
+    def bounds(self, poses: Sequence[Pose]) -> list[Candidate]:
+        """What no score can exceed, by inverse kinematics and collision alone."""
+        found = self.evaluator.evaluate(poses, None, above=NEVER, grid=SPARSE)
+        return [
+            Candidate(
+                pose=pose,
+                score=PoseScore(
+                    score=e.bound,
+                    worst_point=0.0,
+                    reachable_share=e.reachable_share,
+                    path_length_rad=np.nan,
+                ),
+            )
+            for pose, e in zip(poses, found, strict=True)
+        ]
+
+    def exact(
+        self, poses: Sequence[Pose], *, above: float | Sequence[float] = ALWAYS
+    ) -> list[Candidate]:
+        """Map poses; those whose bound is not above a score are left out."""
+        found = self.evaluator.evaluate(poses, self.start, above=above)
+        return [
+            Candidate(
+                pose=pose, score=e.score, exact=e.score is not None, reason=e.reason
+            )
+            for pose, e in zip(poses, found, strict=True)
+            if e.score is not None or e.reason
+        ]

@@ -1,0 +1,176 @@
+"""Where the base goes: predicted places, mapped exactly, then improved and settled."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+
+import numpy as np
+
+from reachmap._typing import FloatArray
+from reachmap.placement.base.lattice import base_lattice, smoothed
+from reachmap.placement.base.question import DIFFERENT_PLACE_M, BaseQuestion
+from reachmap.placement.decision import NO_ROW, SETTLING, Decision
+from reachmap.placement.mapped.candidates import Candidate
+from reachmap.placement.mapped.exact import Pose
+from reachmap.placement.mapped.imaging import UNSEEN
+from reachmap.placement.margins import margins
+from reachmap.placement.predicted.places import rank_key, spread_out
+from reachmap.placement.scan_choice import ScanChoice, choose_scan
+from reachmap.placement.search import REFINE_POSES, refine
+
+# Places that are asked whether they can be imaged, at most, for each that is mapped.
+ASKED_PER_PLACE = 4
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class BaseOutcome:
+    """What a search for one arm and mounting came to.
+
+    Attributes
+    ----------
+    decision : Decision
+    chosen, runner_up, present : int
+        Rows of its table, -1 for none. Nothing is chosen where no place serves.
+    scan : ScanChoice or None
+    margin : dict
+        See :func:`reachmap.placement.margins.margins`.
+    """
+
+    decision: Decision
+    chosen: int
+    runner_up: int
+    present: int
+    scan: ScanChoice | None
+    margin: dict[str, float]
+
+
+def search_base(question: BaseQuestion, reach: float, top: int) -> BaseOutcome:
+    """Find the best place, a runner-up elsewhere, and how far the base may be off.
+
+    Parameters
+    ----------
+    question : BaseQuestion
+    reach : float
+        See :func:`reachmap.placement.base.lattice.reach_m`.
+    top : int
+        Different places that are mapped exactly.
+    """
+    decision = Decision()
+    finalists = _finalists(question, reach, top, decision)
+    own = question.own
+    asked = list(dict.fromkeys([*finalists, *([] if question.contact(own) else [own])]))
+    question.evaluator.expect(len(asked) + REFINE_POSES + SETTLING)
+    mapped = question.exact(asked)
+    inside = [
+        c
+        for c in mapped
+        if c.score is not None and not question.region.outside(np.array(c.pose))
+    ]
+    if inside:
+        best = min(inside, key=rank_key)
+        better = refine(
+            best,
+            question.start,
+            question.region,
+            question.reason_against,
+            question.evaluator,
+        )
+        if better.pose != best.pose:
+            mapped.append(better)
+            inside.append(better)
+    present = NO_ROW
+    for candidate in mapped:
+        row = decision.table.add(candidate)
+        present = row if candidate.pose == own else present
+    allowed = {c.pose for c in inside}
+    decision.rank(unfit={c.pose for c in mapped if c.pose not in allowed})
+    return _settled(question, decision, present)
+
+
+def _finalists(
+    question: BaseQuestion, reach: float, top: int, decision: Decision
+) -> list[Pose]:
+    """Best places by their bounds, far from each other; all go into the table."""
+    poses = base_lattice(question.region, question.own, reach)
+    reasons = [question.reason_against(pose) for pose in poses]
+    free = [pose for pose, reason in zip(poses, reasons, strict=True) if not reason]
+    question.evaluator.expect(len(free) + top + REFINE_POSES + SETTLING)
+    bounds = question.bounds(free)
+    for pose, reason in zip(poses, reasons, strict=True):
+        if reason:
+            decision.table.add(Candidate(pose=pose, reason=reason))
+    for candidate in bounds:
+        decision.table.add(candidate)
+    if not bounds:
+        return []
+    promise = smoothed(free, [c.score.score if c.score else 0.0 for c in bounds])
+    ranked = [
+        dataclasses.replace(c, score=dataclasses.replace(c.score, score=float(value)))
+        for c, value in zip(bounds, promise, strict=True)
+        if c.score is not None and c.score.score > 0.0
+    ]
+    asked: list[Pose] = []
+
+    def can_be_imaged(candidate: Candidate) -> bool:
+        if len(asked) >= ASKED_PER_PLACE * top:
+            return False
+        asked.append(candidate.pose)
+        return question.can_be_imaged(candidate.pose)
+
+    found = spread_out(ranked, top, DIFFERENT_PLACE_M, can_be_imaged)
+    return [c.pose for c in found]
+
+
+def _settled(question: BaseQuestion, decision: Decision, present: int) -> BaseOutcome:
+    rows = decision.table.rows
+    for row in decision.ranked:
+        question.evaluator.expect(SETTLING)
+        pose = rows[row].pose
+        scan = _scan(question, rows[row])
+        if scan is None:
+            rows[row] = Candidate(pose=pose, exact=True, reason=UNSEEN)
+            continue
+        chosen = row
+        if scan.is_new:
+            scored = dataclasses.replace(rows[row], score=scan.score)
+            chosen = decision.table.add(scored)
+        if row == present:
+            present = chosen
+        return BaseOutcome(
+            decision=decision,
+            chosen=chosen,
+            runner_up=decision.runner_up(pose, DIFFERENT_PLACE_M),
+            present=present,
+            scan=scan,
+            margin=_margins(question, pose, scan.q),
+        )
+    return BaseOutcome(
+        decision=decision,
+        chosen=NO_ROW,
+        runner_up=NO_ROW,
+        present=present,
+        scan=None,
+        margin={},
+    )
+
+
+def _scan(question: BaseQuestion, candidate: Candidate) -> ScanChoice | None:
+    if not question.keep_scan:
+        return choose_scan(question.placed(candidate.pose), question.evaluator)
+    assert candidate.score is not None
+    return ScanChoice(
+        q=question.scan_configuration, score=candidate.score, is_new=False
+    )
+
+
+def _margins(question: BaseQuestion, pose: Pose, q: FloatArray) -> dict[str, float]:
+    found = margins(
+        pose, q, lambda moved: question.is_possible(moved, q), question.evaluator
+    )
+    # What is fixed has no margin that anybody could use.
+    return {
+        name: value
+        for name, value in found.items()
+        if question.fit is not None or name.lstrip("+-") == "x"
+    }

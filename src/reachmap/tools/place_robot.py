@@ -1,0 +1,478 @@
+"""``place-robot``: a cell goes in, the place of its arm comes out."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from reachmap._typing import FloatArray
+from reachmap.cell.base_pose import (
+    T_world_bin_of,
+    heading_rad,
+    level_frame,
+    seen_from,
+    stands_of,
+)
+from reachmap.cell.fragments import fragment_overrides
+from reachmap.cell.loaded import LoadedCell
+from reachmap.cell.loading import cell_path, read_cell
+from reachmap.core.kinematics.kinematics import Kinematics
+from reachmap.core.robot.model import RobotModel
+from reachmap.core.scene import Scene
+from reachmap.errors import SceneError, SettingsError
+from reachmap.maps import RunClock, check_outputs, publish
+from reachmap.maps.base.format import write_base
+from reachmap.maps.base.record import BasePlacement
+from reachmap.maps.bytes.publish import check_picture
+from reachmap.maps.records import Stamp
+from reachmap.placement.base.fit import BaseFit
+from reachmap.placement.base.lattice import base_region, reach_m
+from reachmap.placement.base.mounting import (
+    AS_IT_IS,
+    LEANS_DEG,
+    AnyMounting,
+    Mounting,
+    RailMounting,
+    T_level_base_of,
+    own_pose,
+)
+from reachmap.placement.base.question import BaseQuestion
+from reachmap.placement.base.search import BaseOutcome, search_base
+from reachmap.placement.base.settings import base_settings
+from reachmap.placement.decision import NO_ROW
+from reachmap.placement.mapped.evaluator import open_evaluator
+from reachmap.placement.mapped.exact import Pose
+from reachmap.placement.mapped.imaging import can_choose
+from reachmap.placement.mapped.sample import open_frames
+from reachmap.placement.predicted.places import rank_key
+from reachmap.placement.predicted.region import AXES, Region
+from reachmap.runtime.options import IN_PROCESS, RunOptions
+from reachmap.runtime.progress import Progress
+from reachmap.scans.document import (
+    checking_settings,
+    provenance_from_document,
+    scan_document,
+)
+from reachmap.tools.options import with_seed
+from reachmap.tools.prologue import path_of_cell, refuse_cell_files
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RobotChoice:
+    """How the arm is placed.
+
+    Attributes
+    ----------
+    mountings : tuple of str
+        ``floor``, ``wall``, ``ceiling`` or a lean [deg]; empty: as the cell has it.
+    rail : str
+        Locked prismatic joint whose position is sought instead of a pose, or "".
+    limits : mapping
+        ``x``, ``y``, ``z`` to (low, high) in the world [m]; of a rail ``x``.
+    fixed : mapping
+        ``x``, ``y``, ``z`` [m] or ``yaw`` [deg] to a value.
+    moves, stays : tuple of str
+        Bodies on the world that go with the base, besides those that may touch it, and
+        those that do not.
+    arms : tuple of Path
+        Cell fragments with other arms, compared with the cell's own.
+    top : int
+        Different places that are mapped exactly.
+    keep_scan_configuration : bool
+    """
+
+    mountings: tuple[str, ...] = ()
+    rail: str = ""
+    limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    fixed: Mapping[str, float] = field(default_factory=dict)
+    moves: tuple[str, ...] = ()
+    stays: tuple[str, ...] = ()
+    arms: tuple[Path, ...] = ()
+    top: int = 3
+    keep_scan_configuration: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Search:
+    """One arm in one mounting, and what became of it."""
+
+    arm: int
+    mounting: int
+    loaded: LoadedCell
+    question: BaseQuestion
+    outcome: BaseOutcome
+    T_world_level: FloatArray
+
+    def pose(self, row: int) -> Pose:
+        return self.outcome.decision.table.rows[row].pose
+
+
+def place_robot(
+    cell: str,
+    output: Path,
+    *,
+    choice: RobotChoice | None = None,
+    overrides: Sequence[str] = (),
+    seed: int | None = None,
+    picture: Path | None = None,
+    run: RunOptions = IN_PROCESS,
+) -> BasePlacement:
+    """Choose where the arm stands for a bin that is fixed in the world.
+
+    Parameters
+    ----------
+    cell : str
+        Shipped name or path.
+    output : Path
+        The artefact to write.
+    choice : RobotChoice, optional
+    overrides : sequence of str
+        ``key.path=value``.
+    seed : int, optional
+    picture : Path, optional
+        Also draw the places there; the suffix, .png or .svg, says how.
+    run : RunOptions
+
+    Raises
+    ------
+    ReachmapError
+        See :mod:`reachmap.errors`.
+    """
+    choice = choice or RobotChoice()
+    _check(choice)
+    check_picture(picture, "--picture")
+    check_outputs(
+        [output, picture],
+        overwrite=run.overwrite,
+        inputs=[path_of_cell(cell), *choice.arms],
+    )
+    clock = RunClock(workers=run.workers)
+    overrides = with_seed(overrides, seed)
+    cells = _cells(cell, overrides, choice)
+    refuse_cell_files([output, picture], cells[0])
+    names = (choice.rail,) if choice.rail else choice.mountings or (AS_IT_IS,)
+    with clock.phase("decide"):
+        searches = [
+            _searched(loaded, name, choice, run, arm=arm, mounting=k)
+            for arm, loaded in enumerate(cells)
+            for k, name in enumerate(names)
+        ]
+    arms = ("the cell's own", *(path.stem for path in choice.arms))
+    placement = _record(searches, arms, names, choice, clock)
+    write_base(output, placement, overwrite=run.overwrite)
+    if picture is not None:
+        _draw(picture, placement, run)
+    return placement
+
+
+def _check(choice: RobotChoice) -> None:
+    """Refuse wrong settings before the work is done."""
+    if choice.top < 1:
+        raise SettingsError(f"top {choice.top}: expected at least 1")
+    unknown = sorted(set(choice.fixed) - set(AXES))
+    if unknown:
+        raise SettingsError(f"--fix {unknown[0]}: expected one of {', '.join(AXES)}")
+    for name in choice.mountings:
+        try:
+            fits = name in LEANS_DEG or 0.0 <= float(name) <= 180.0
+        except ValueError:
+            fits = False
+        if not fits:
+            raise SettingsError(
+                f"--mount {name!r:.40}: expected {', '.join(LEANS_DEG)} or a lean from "
+                "0 to 180 [deg]"
+            )
+    if choice.rail and (choice.mountings or choice.fixed or set(choice.limits) - {"x"}):
+        raise SettingsError(
+            "--rail: the base stays where it is, so that --mount, --fix, --heights and "
+            "--region have no meaning (--rail-range limits the joint)"
+        )
+
+
+def _cells(
+    cell: str, overrides: Sequence[str], choice: RobotChoice
+) -> list[LoadedCell]:
+    """The cell, and the same with each other arm."""
+    own = read_cell(cell, overrides)
+    others = [
+        read_cell(
+            cell,
+            [*fragment_overrides(path, own.text, str(cell_path(cell))), *overrides],
+        )
+        for path in choice.arms
+    ]
+    for loaded in (own, *others):
+        if loaded.cell.bin_scan.orientations.reference == "robot_base":
+            raise SettingsError(
+                "bin_scan.orientations.reference is robot_base: test grasps that turn "
+                "with the base are others at each place (world and bin can be used)"
+            )
+    return [own, *others]
+
+
+def _searched(
+    loaded: LoadedCell,
+    name: str,
+    choice: RobotChoice,
+    run: RunOptions,
+    *,
+    arm: int,
+    mounting: int,
+) -> _Search:
+    along_world = bool({"x", "y"} & {*choice.limits, *choice.fixed})
+    T_world_level = level_frame(loaded.cell, along_world=along_world)
+    levelled = seen_from(loaded, T_world_level)
+    T_level_base = T_level_base_of(loaded, T_world_level)
+    how = _mounting(name, loaded, choice, T_level_base)
+    scene = how.scene(levelled)
+    kinematics = Kinematics(scene.robot)
+    reach = reach_m(kinematics)
+    own, region = _own_and_region(loaded, choice, T_world_level, T_level_base, reach)
+    is_open = open_frames(scene.robot, levelled)
+    progress = Progress(f"place-robot {name}", quiet=run.quiet)
+    with open_evaluator(
+        levelled, is_open, run, progress=progress, placing=how
+    ) as evaluator:
+        question = BaseQuestion(
+            loaded=levelled,
+            mounting=how,
+            is_open=is_open,
+            region=region,
+            own=own,
+            scene=scene,
+            scan_configuration=np.array(scene.scan_configuration),
+            keep_scan=choice.keep_scan_configuration or not can_choose(scene),
+            fit=BaseFit(levelled, how) if isinstance(how, Mounting) else None,
+            evaluator=evaluator,
+        )
+        outcome = search_base(question, reach, choice.top)
+    return _Search(
+        arm=arm,
+        mounting=mounting,
+        loaded=loaded,
+        question=question,
+        outcome=outcome,
+        T_world_level=T_world_level,
+    )
+
+
+def _mounting(
+    name: str, loaded: LoadedCell, choice: RobotChoice, T_level_base: FloatArray
+) -> AnyMounting:
+    if choice.rail:
+        joint = loaded.robot.joints.get(choice.rail)
+        locked = loaded.cell.robot.locked_joints_deg
+        if joint is None or joint.type != "prismatic" or choice.rail not in locked:
+            raise SettingsError(
+                f"--rail {choice.rail!r:.60}: expected a prismatic joint that the cell "
+                f"has in robot.locked_joints_deg (there: {', '.join(locked) or 'none'})"
+            )
+        return RailMounting(name=choice.rail)
+    known = {b.name for b in loaded.cell.bodies if b.attach_to == "world"}
+    for body in (*choice.moves, *choice.stays):
+        if body not in known:
+            raise SettingsError(
+                f"{body!r:.60} is no body on the world "
+                f"(those are: {', '.join(sorted(known)) or 'none'})"
+            )
+    stands = dict.fromkeys([*stands_of(loaded), *choice.moves])
+    kept = tuple(body for body in stands if body not in choice.stays)
+    return Mounting.of(name, T_level_base[:3, :3], kept)
+
+
+def _own_and_region(
+    loaded: LoadedCell,
+    choice: RobotChoice,
+    T_world_level: FloatArray,
+    T_level_base: FloatArray,
+    reach: float,
+) -> tuple[Pose, Region]:
+    """Present pose, and where the base may stand, both in the level frame."""
+    if choice.rail:
+        at = loaded.cell.robot.locked_joints_deg[choice.rail]
+        joint = loaded.robot.joints[choice.rail]
+        if joint.lower is None or joint.upper is None:
+            raise SettingsError(f"--rail {choice.rail}: the joint has no limits")
+        low, high = choice.limits.get("x", (joint.lower, joint.upper))
+        low, high = max(low, joint.lower), min(high, joint.upper)
+        if low > high:
+            raise SettingsError(
+                f"--rail {choice.rail}: expected a range inside its limits "
+                f"[{joint.lower:g}, {joint.upper:g}] m"
+            )
+        zero = dict.fromkeys(("y", "z", "yaw"), 0.0)
+        own = (round(at, 9), 0.0, 0.0, 0.0)
+        return own, base_region(own, reach, {"x": (low, high)}, zero)
+    own = own_pose(T_level_base)
+    origin = dict(zip(AXES, T_world_level[:3, 3].tolist(), strict=False))
+    limits = {
+        name: (low - origin[name], high - origin[name])
+        for name, (low, high) in choice.limits.items()
+    }
+    fixed = {
+        name: value - origin[name]
+        for name, value in choice.fixed.items()
+        if name != "yaw"
+    }
+    if "yaw" in choice.fixed:
+        heading = heading_rad(loaded.cell.robot.base_pose.matrix()[:3, :3])
+        fixed["yaw"] = float(np.radians(choice.fixed["yaw"])) - heading
+    return own, base_region(own, reach, limits, fixed)
+
+
+def _record(
+    searches: Sequence[_Search],
+    arms: tuple[str, ...],
+    names: tuple[str, ...],
+    choice: RobotChoice,
+    clock: RunClock,
+) -> BasePlacement:
+    """One table of all searches, and the best of them all.
+
+    Raises
+    ------
+    SceneError
+        No place serves.
+    """
+    first = np.cumsum([0, *(len(s.outcome.decision.table.rows) for s in searches)])
+    found = [k for k, s in enumerate(searches) if s.outcome.chosen != NO_ROW]
+    if not found:
+        raise SceneError(_nowhere(searches))
+    ranked = sorted(found, key=lambda k: _rank(searches[k]))
+    best = searches[ranked[0]]
+    # Of one arm and mounting the runner-up stands elsewhere; the best of another is
+    # one as well.
+    rivals = [int(first[k]) + searches[k].outcome.chosen for k in ranked[1:]]
+    if best.outcome.runner_up != NO_ROW:
+        rivals.append(int(first[ranked[0]]) + best.outcome.runner_up)
+    rows = [row for s in searches for row in s.outcome.decision.table.rows]
+    rivals = [k for k in rivals if rows[k].score is not None]
+    best_of = np.full((len(arms), len(names)), NO_ROW)
+    for k in found:
+        chosen = int(first[k]) + searches[k].outcome.chosen
+        best_of[searches[k].arm, searches[k].mounting] = chosen
+    assert best.outcome.scan is not None
+    final = _final_cell(best)
+    scene = Scene.build(final, with_bin=True)
+    scene.require_free_scan_configuration()
+    document = scan_document(
+        scene,
+        kind="base_placement",
+        method="search",
+        settings={
+            **checking_settings(scene),
+            "roadmap": final.cell.roadmap.model_dump(mode="json"),
+            "base_placement": base_settings() | _choice_settings(choice),
+        },
+    )
+    present = searches[0].outcome.present
+    places, headings = _in_world(searches)
+    return BasePlacement(
+        base_pose=final.cell.robot.base_pose.matrix(),
+        bin_pose=T_world_bin_of(final.cell),
+        scan_configuration=np.array(best.outcome.scan.q),
+        joint_names=scene.robot.joint_names,
+        rail=choice.rail,
+        chosen=int(first[ranked[0]]) + best.outcome.chosen,
+        runner_up=min(rivals, key=lambda k: rank_key(rows[k]), default=NO_ROW),
+        present=present,
+        arms=arms,
+        mountings=names,
+        best_of=best_of,
+        arm=np.repeat([s.arm for s in searches], np.diff(first)),
+        mounting=np.repeat([s.mounting for s in searches], np.diff(first)),
+        candidate_position=places,
+        candidate_yaw=headings,
+        **{
+            name: np.concatenate(
+                [getattr(s.outcome.decision.table, how)(*of) for s in searches]
+            )
+            for name, how, of in _COLUMNS
+        },
+        reason=tuple(row.reason for row in rows),
+        margin=best.outcome.margin,
+        T_world_level=best.T_world_level,
+        stamp=Stamp(**document["stamp"]),
+        provenance=provenance_from_document(document),
+        run=clock.finish(),
+    )
+
+
+_COLUMNS: tuple[tuple[str, str, tuple[str, ...]], ...] = (
+    ("score", "values", ("score",)),
+    ("score_error", "values", ("error",)),
+    ("worst_point", "values", ("worst_point",)),
+    ("reachable_share", "values", ("reachable_share",)),
+    ("exact", "exact", ()),
+)
+
+
+def _rank(search: _Search) -> Any:
+    return rank_key(search.outcome.decision.table.rows[search.outcome.chosen])[:3]
+
+
+def _nowhere(searches: Sequence[_Search]) -> str:
+    reasons = sorted(
+        {r for s in searches for r in s.outcome.decision.table.reasons() if r}
+    )
+    why = f" ({'; '.join(reasons[:4])})" if reasons else ""
+    return f"{searches[0].loaded.source}: the arm reaches the bin from nowhere{why}"
+
+
+def _final_cell(search: _Search) -> LoadedCell:
+    """The cell in its own world, with its base and scan configuration."""
+    scan = search.outcome.scan
+    assert scan is not None
+    pose = search.pose(search.outcome.chosen)
+    placed = search.question.mounting.final(search.loaded, pose, search.T_world_level)
+    names = RobotModel.from_cell(placed).joint_names
+    return placed.with_changes(
+        scan_configuration_rad=dict(zip(names, scan.q.tolist(), strict=True))
+    )
+
+
+def _in_world(searches: Sequence[_Search]) -> tuple[FloatArray, FloatArray]:
+    """Places (n, 3) and headings (n,) of all candidates in the world."""
+    places, headings = [], []
+    for search in searches:
+        how, T = search.question.mounting, search.T_world_level
+        for row in search.outcome.decision.table.rows:
+            if isinstance(how, RailMounting):
+                places.append(np.array([row.pose[0], 0.0, 0.0]))
+                headings.append(0.0)
+                continue
+            T_world_base = T @ how.T_level_base(row.pose)
+            places.append(T_world_base[:3, 3])
+            headings.append(heading_rad(T_world_base[:3, :3]))
+    return np.array(places).reshape(-1, 3), np.array(headings, float)
+
+
+def _choice_settings(choice: RobotChoice) -> dict[str, Any]:
+    return {
+        "mountings": list(choice.mountings),
+        "rail": choice.rail,
+        "limits": {k: list(v) for k, v in choice.limits.items()},
+        "fixed": dict(choice.fixed),
+        "moves": list(choice.moves),
+        "stays": list(choice.stays),
+        "arms": [path.name for path in choice.arms],
+        "top": choice.top,
+        "keep_scan_configuration": choice.keep_scan_configuration,
+    }
+
+
+def _draw(path: Path, placement: BasePlacement, run: RunOptions) -> None:
+    from reachmap.plots.base import draw_base
+    from reachmap.plots.parts.style import figure_bytes
+
+    data = figure_bytes(
+        draw_base(placement),
+        "svg" if path.suffix == ".svg" else "png",
+        title="Where the arm goes",
+        config_sha256=placement.stamp.config_sha256,
+    )
+    publish(path, [data], overwrite=run.overwrite)
