@@ -11,7 +11,6 @@ import numpy as np
 
 from reachmap._typing import FloatArray
 from reachmap.cell.base_pose import (
-    T_world_bin_of,
     heading_rad,
     level_frame,
     seen_from,
@@ -21,14 +20,12 @@ from reachmap.cell.fragments import fragment_overrides
 from reachmap.cell.loaded import LoadedCell
 from reachmap.cell.loading import cell_path, read_cell
 from reachmap.core.kinematics.kinematics import Kinematics
-from reachmap.core.robot.model import RobotModel
-from reachmap.core.scene import Scene
-from reachmap.errors import SceneError, SettingsError
+from reachmap.errors import SettingsError
 from reachmap.maps import RunClock, check_outputs, publish
 from reachmap.maps.base.format import write_base
 from reachmap.maps.base.record import BasePlacement
 from reachmap.maps.bytes.publish import check_picture
-from reachmap.maps.records import Stamp
+from reachmap.placement.base.assembly import BaseSearch, base_placement
 from reachmap.placement.base.fit import BaseFit
 from reachmap.placement.base.lattice import base_region, reach_m
 from reachmap.placement.base.mounting import (
@@ -41,22 +38,14 @@ from reachmap.placement.base.mounting import (
     own_pose,
 )
 from reachmap.placement.base.question import BaseQuestion
-from reachmap.placement.base.search import BaseOutcome, search_base
-from reachmap.placement.base.settings import base_settings
-from reachmap.placement.decision import NO_ROW
+from reachmap.placement.base.search import search_base
 from reachmap.placement.mapped.evaluator import open_evaluator
 from reachmap.placement.mapped.exact import Pose
 from reachmap.placement.mapped.imaging import can_choose
 from reachmap.placement.mapped.sample import open_frames
-from reachmap.placement.predicted.places import rank_key
 from reachmap.placement.predicted.region import AXES, Region
 from reachmap.runtime.options import IN_PROCESS, RunOptions
 from reachmap.runtime.progress import Progress
-from reachmap.scans.document import (
-    checking_settings,
-    provenance_from_document,
-    scan_document,
-)
 from reachmap.tools.options import with_seed
 from reachmap.tools.prologue import path_of_cell, refuse_cell_files
 
@@ -94,21 +83,6 @@ class RobotChoice:
     arms: tuple[Path, ...] = ()
     top: int = 3
     keep_scan_configuration: bool = False
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Search:
-    """One arm in one mounting, and what became of it."""
-
-    arm: int
-    mounting: int
-    loaded: LoadedCell
-    question: BaseQuestion
-    outcome: BaseOutcome
-    T_world_level: FloatArray
-
-    def pose(self, row: int) -> Pose:
-        return self.outcome.decision.table.rows[row].pose
 
 
 def place_robot(
@@ -162,7 +136,9 @@ def place_robot(
             for k, name in enumerate(names)
         ]
     arms = ("the cell's own", *(path.stem for path in choice.arms))
-    placement = _record(searches, arms, names, choice, clock)
+    placement = base_placement(
+        searches, arms, names, _choice_settings(choice), rail=choice.rail, clock=clock
+    )
     write_base(output, placement, overwrite=run.overwrite)
     if picture is not None:
         _draw(picture, placement, run)
@@ -222,7 +198,7 @@ def _searched(
     *,
     arm: int,
     mounting: int,
-) -> _Search:
+) -> BaseSearch:
     along_world = bool({"x", "y"} & {*choice.limits, *choice.fixed})
     T_world_level = level_frame(loaded.cell, along_world=along_world)
     levelled = seen_from(loaded, T_world_level)
@@ -250,7 +226,7 @@ def _searched(
             evaluator=evaluator,
         )
         outcome = search_base(question, reach, choice.top)
-    return _Search(
+    return BaseSearch(
         arm=arm,
         mounting=mounting,
         loaded=loaded,
@@ -322,133 +298,6 @@ def _own_and_region(
         heading = heading_rad(loaded.cell.robot.base_pose.matrix()[:3, :3])
         fixed["yaw"] = float(np.radians(choice.fixed["yaw"])) - heading
     return own, base_region(own, reach, limits, fixed)
-
-
-def _record(
-    searches: Sequence[_Search],
-    arms: tuple[str, ...],
-    names: tuple[str, ...],
-    choice: RobotChoice,
-    clock: RunClock,
-) -> BasePlacement:
-    """One table of all searches, and the best of them all.
-
-    Raises
-    ------
-    SceneError
-        No place serves.
-    """
-    first = np.cumsum([0, *(len(s.outcome.decision.table.rows) for s in searches)])
-    found = [k for k, s in enumerate(searches) if s.outcome.chosen != NO_ROW]
-    if not found:
-        raise SceneError(_nowhere(searches))
-    ranked = sorted(found, key=lambda k: _rank(searches[k]))
-    best = searches[ranked[0]]
-    # Of one arm and mounting the runner-up stands elsewhere; the best of another is
-    # one as well.
-    rivals = [int(first[k]) + searches[k].outcome.chosen for k in ranked[1:]]
-    if best.outcome.runner_up != NO_ROW:
-        rivals.append(int(first[ranked[0]]) + best.outcome.runner_up)
-    rows = [row for s in searches for row in s.outcome.decision.table.rows]
-    rivals = [k for k in rivals if rows[k].score is not None]
-    best_of = np.full((len(arms), len(names)), NO_ROW)
-    for k in found:
-        chosen = int(first[k]) + searches[k].outcome.chosen
-        best_of[searches[k].arm, searches[k].mounting] = chosen
-    assert best.outcome.scan is not None
-    final = _final_cell(best)
-    scene = Scene.build(final, with_bin=True)
-    scene.require_free_scan_configuration()
-    document = scan_document(
-        scene,
-        kind="base_placement",
-        method="search",
-        settings={
-            **checking_settings(scene),
-            "roadmap": final.cell.roadmap.model_dump(mode="json"),
-            "base_placement": base_settings() | _choice_settings(choice),
-        },
-    )
-    present = searches[0].outcome.present
-    places, headings = _in_world(searches)
-    return BasePlacement(
-        base_pose=final.cell.robot.base_pose.matrix(),
-        bin_pose=T_world_bin_of(final.cell),
-        scan_configuration=np.array(best.outcome.scan.q),
-        joint_names=scene.robot.joint_names,
-        rail=choice.rail,
-        chosen=int(first[ranked[0]]) + best.outcome.chosen,
-        runner_up=min(rivals, key=lambda k: rank_key(rows[k]), default=NO_ROW),
-        present=present,
-        arms=arms,
-        mountings=names,
-        best_of=best_of,
-        arm=np.repeat([s.arm for s in searches], np.diff(first)),
-        mounting=np.repeat([s.mounting for s in searches], np.diff(first)),
-        candidate_position=places,
-        candidate_yaw=headings,
-        **{
-            name: np.concatenate(
-                [getattr(s.outcome.decision.table, how)(*of) for s in searches]
-            )
-            for name, how, of in _COLUMNS
-        },
-        reason=tuple(row.reason for row in rows),
-        margin=best.outcome.margin,
-        T_world_level=best.T_world_level,
-        stamp=Stamp(**document["stamp"]),
-        provenance=provenance_from_document(document),
-        run=clock.finish(),
-    )
-
-
-_COLUMNS: tuple[tuple[str, str, tuple[str, ...]], ...] = (
-    ("score", "values", ("score",)),
-    ("score_error", "values", ("error",)),
-    ("worst_point", "values", ("worst_point",)),
-    ("reachable_share", "values", ("reachable_share",)),
-    ("exact", "exact", ()),
-)
-
-
-def _rank(search: _Search) -> Any:
-    return rank_key(search.outcome.decision.table.rows[search.outcome.chosen])[:3]
-
-
-def _nowhere(searches: Sequence[_Search]) -> str:
-    reasons = sorted(
-        {r for s in searches for r in s.outcome.decision.table.reasons() if r}
-    )
-    why = f" ({'; '.join(reasons[:4])})" if reasons else ""
-    return f"{searches[0].loaded.source}: the arm reaches the bin from nowhere{why}"
-
-
-def _final_cell(search: _Search) -> LoadedCell:
-    """The cell in its own world, with its base and scan configuration."""
-    scan = search.outcome.scan
-    assert scan is not None
-    pose = search.pose(search.outcome.chosen)
-    placed = search.question.mounting.final(search.loaded, pose, search.T_world_level)
-    names = RobotModel.from_cell(placed).joint_names
-    return placed.with_changes(
-        scan_configuration_rad=dict(zip(names, scan.q.tolist(), strict=True))
-    )
-
-
-def _in_world(searches: Sequence[_Search]) -> tuple[FloatArray, FloatArray]:
-    """Places (n, 3) and headings (n,) of all candidates in the world."""
-    places, headings = [], []
-    for search in searches:
-        how, T = search.question.mounting, search.T_world_level
-        for row in search.outcome.decision.table.rows:
-            if isinstance(how, RailMounting):
-                places.append(np.array([row.pose[0], 0.0, 0.0]))
-                headings.append(0.0)
-                continue
-            T_world_base = T @ how.T_level_base(row.pose)
-            places.append(T_world_base[:3, 3])
-            headings.append(heading_rad(T_world_base[:3, :3]))
-    return np.array(places).reshape(-1, 3), np.array(headings, float)
 
 
 def _choice_settings(choice: RobotChoice) -> dict[str, Any]:
