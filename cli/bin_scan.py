@@ -18,6 +18,7 @@ from reachmap.cli.options import (
     unused,
 )
 from reachmap.cli.text.tables import facts_text
+from reachmap.runtime.options import RunOptions
 
 log = logging.getLogger(__name__)
 
@@ -50,14 +51,9 @@ def command(
     part: str | None,
     overrides: tuple[str, ...],
     seed: int | None,
-    workers: int,
-    executor: str,
-    shard: tuple[int, int] | None,
-    restart: bool,
-    overwrite: bool,
     dry_run: bool,
-    progress: bool,
     as_json: bool,
+    run: RunOptions,
 ) -> None:
     """Plan to every test grasp inside the bin.
 
@@ -70,7 +66,6 @@ def command(
 
     Example: reachmap bin-scan placement.h5 --set bin_scan.repeats=1
     """
-    from reachmap.runtime.options import RunOptions
     from reachmap.tools.bin_scan import bin_scan, estimate_bin_scan, summary_of_bin
     from reachmap.tools.options import written_by
 
@@ -78,21 +73,13 @@ def command(
         overrides = (*overrides, f"bin_scan.attempts={attempts}")
     if part is not None:
         overrides = (*overrides, f"part={part}")
-    check_scan_options(shard, executor, dry_run=dry_run)
+    check_scan_options(run, dry_run=dry_run)
     if placement is not None:
         unused("cell", because="PLACEMENT holds the cell; leave one of them out")
         cell = None
     workspace = None
     if placement is None and cell is None:
         placement, workspace = _found_here()
-    run = RunOptions(
-        workers=workers,
-        executor=executor,
-        shard=shard,
-        restart=restart,
-        overwrite=overwrite,
-        quiet=not progress,
-    )
     if dry_run:
         facts = estimate_bin_scan(
             placement,

@@ -28,6 +28,7 @@ table of :data:`FOR_ALL` has it, from one variable for every command
 
 from __future__ import annotations
 
+import functools
 import os
 from collections.abc import Callable
 from pathlib import Path
@@ -37,7 +38,7 @@ import click
 from click.core import ParameterSource
 
 from reachmap.cli.failures import RunState
-from reachmap.runtime.options import available_cores
+from reachmap.runtime.options import RunOptions, available_cores
 
 Decorated = TypeVar("Decorated", bound=Callable[..., Any])
 Decorator = Callable[[Decorated], Decorated]
@@ -236,6 +237,30 @@ def compose(*decorators: Decorator[Any]) -> Decorator[Any]:
     return decorate
 
 
+def into_run(function: Any) -> Any:
+    """Pass what says how a command computes as one ``run: RunOptions``."""
+
+    @functools.wraps(function)
+    def command(**values: Any) -> Any:
+        names = ("workers", "executor", "shard", "restart", "overwrite")
+        how = {name: values.pop(name) for name in names if name in values}
+        if how.get("executor", "").startswith("dask:tcp:"):
+            unused("workers", because="the workers are those of the cluster")
+        run = RunOptions(**how, quiet=not values.pop("progress"))
+        return function(**values, run=run)
+
+    return command
+
+
+run_options = compose(
+    workers_option,
+    executor_option,
+    overwrite_option,
+    progress_option,
+    json_option,
+    into_run,
+)
+
 scan_options = compose(
     set_option,
     seed_option,
@@ -247,24 +272,16 @@ scan_options = compose(
     dry_run_option,
     progress_option,
     json_option,
+    into_run,
 )
 
 
-def check_scan_options(
-    shard: tuple[int, int] | None, executor: str, *, dry_run: bool
-) -> None:
+def check_scan_options(run: RunOptions, *, dry_run: bool) -> None:
     """Refuse options of a scan that would change nothing."""
-    if shard is not None:
+    if run.shard is not None:
         unused("overwrite", because="a shard leaves a store, which --restart discards")
     if dry_run:
         unused("overwrite", "restart", because="--dry-run writes nothing")
-    check_workers(executor)
-
-
-def check_workers(executor: str) -> None:
-    """Refuse a number of workers for a cluster that has its own."""
-    if executor.startswith("dask:tcp:"):
-        unused("workers", because="the workers are those of the cluster")
 
 
 FORMATS = (
@@ -278,29 +295,29 @@ FORMATS = (
 )
 
 
-class ShareType(click.ParamType):  # type: ignore[type-arg, unused-ignore]
-    """A number, or a percentage: (20, False) for ``20``, (20, True) for ``20%``."""
+def into_settings(function: Any) -> Any:
+    """Pass how grasps are ranked as ``settings: RankSettings, basis: CostBasis``."""
 
-    name = "share"
+    @functools.wraps(function)
+    def command(
+        weights: Any, likeness: float, margins: Any, neighbours: int, roll: Any,
+        max_angle: float | None, normalise: Any, planning_time: Any, **values: Any,
+    ) -> Any:  # fmt: skip
+        from reachmap.ranking.lookup.settings import CostBasis, RankSettings
 
-    def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> tuple[float, bool]:
-        """Read one; click reports what is none."""
-        if isinstance(value, tuple):
-            return value
-        text = str(value).strip()
-        percent = text.endswith("%")
-        try:
-            number = float(text.removesuffix("%"))
-        except ValueError:
-            number = -1.0
-        if not 0 <= number < (100.1 if percent else 1e9):
-            self.fail(f"{value!r} is neither a number of grasps nor a percentage")
-        return number, percent
+        settings = RankSettings(
+            weights=weights,
+            likeness=likeness,
+            margins=dict(margins),
+            neighbours=neighbours,
+            roll=roll,
+            max_angle_deg=max_angle,
+        )
+        basis = CostBasis(normalise=normalise, planning_time=planning_time)
+        return function(**values, settings=settings, basis=basis)
 
+    return command
 
-SHARE = ShareType()
 
 list_options = compose(
     click.option(
@@ -377,4 +394,5 @@ list_options = compose(
         help="Format of the lists; by default their content tells.",
     ),
     click.option("--frame", metavar="NAME", help="Frame of imported lists."),
+    into_settings,
 )

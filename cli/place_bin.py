@@ -12,18 +12,14 @@ import click
 from reachmap.cli.options import (
     INPUT_FILE,
     OUTPUT_PATH,
-    check_workers,
     compose,
-    executor_option,
-    json_option,
     output_option,
-    overwrite_option,
-    progress_option,
+    run_options,
     seed_option,
     set_option,
     unused,
-    workers_option,
 )
+from reachmap.runtime.options import RunOptions
 
 if TYPE_CHECKING:
     from reachmap.maps import BinPlacement
@@ -126,11 +122,7 @@ region_options = compose(
 @output_option("placement.h5")
 @set_option
 @seed_option
-@workers_option
-@executor_option
-@overwrite_option
-@progress_option
-@json_option
+@run_options
 def command(
     workspace: Path,
     rule: str,
@@ -145,11 +137,8 @@ def command(
     output: Path,
     overrides: tuple[str, ...],
     seed: int | None,
-    workers: int,
-    executor: str,
-    overwrite: bool,
-    progress: bool,
     as_json: bool,
+    run: RunOptions,
 ) -> None:
     """Find where the bin should stand, and its scan configuration.
 
@@ -165,8 +154,6 @@ def command(
         unused(
             "rule", "fixed", "region", "heights", because="--bin-pose is not searched"
         )
-    check_workers(executor)
-    from reachmap.runtime.options import RunOptions
     from reachmap.tools.place_bin import PlacementChoice, place_bin, placement_facts
 
     limits = {} if region is None else {"x": region[:2], "y": region[2:]}
@@ -185,12 +172,7 @@ def command(
         overrides=overrides,
         seed=seed,
         picture=picture,
-        run=RunOptions(
-            workers=workers,
-            executor=executor,
-            overwrite=overwrite,
-            quiet=not progress,
-        ),
+        run=run,
     )
     if as_json:
         click.echo(json.dumps({"output": str(output)} | placement_facts(placement)))

@@ -12,19 +12,15 @@ from reachmap.cli.options import (
     INPUT_FILE,
     OUTPUT_PATH,
     cell_argument,
-    check_workers,
     compose,
-    executor_option,
-    json_option,
     output_option,
-    overwrite_option,
-    progress_option,
+    run_options,
     seed_option,
     set_option,
     unused,
-    workers_option,
 )
 from reachmap.cli.place_bin import parse_fixed
+from reachmap.runtime.options import RunOptions
 
 places_options = compose(
     click.option(
@@ -120,11 +116,7 @@ places_options = compose(
 @output_option("robot.h5")
 @set_option
 @seed_option
-@workers_option
-@executor_option
-@overwrite_option
-@progress_option
-@json_option
+@run_options
 def command(
     cell: str,
     mountings: tuple[str, ...],
@@ -142,11 +134,8 @@ def command(
     output: Path,
     overrides: tuple[str, ...],
     seed: int | None,
-    workers: int,
-    executor: str,
-    overwrite: bool,
-    progress: bool,
     as_json: bool,
+    run: RunOptions,
 ) -> None:
     """Find where the arm should stand, for a bin that stays.
 
@@ -159,11 +148,9 @@ def command(
     """
     if not rail:
         unused("rail_range", because="needs --rail")
-    check_workers(executor)
     from reachmap.cli.text.base import base_lines
     from reachmap.maps.bytes.to_json import json_ready
     from reachmap.maps.summary.base import summarise_base
-    from reachmap.runtime.options import RunOptions
     from reachmap.tools.place_robot import RobotChoice, place_robot
 
     limits = {} if region is None else {"x": region[:2], "y": region[2:]}
@@ -186,12 +173,7 @@ def command(
         overrides=overrides,
         seed=seed,
         picture=picture,
-        run=RunOptions(
-            workers=workers,
-            executor=executor,
-            overwrite=overwrite,
-            quiet=not progress,
-        ),
+        run=run,
     )
     summary = summarise_base(placement)
     if as_json:

@@ -3,14 +3,39 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from reachmap.cli import options
 from reachmap.cli.options import list_options
 
+if TYPE_CHECKING:
+    from reachmap.ranking.lookup.settings import CostBasis, RankSettings
+
 AXES = ("+x", "-x", "+y", "-y", "+z", "-z")
+
+
+class ShareType(click.ParamType):  # type: ignore[type-arg, unused-ignore]
+    """A number, or a percentage: (20, False) for ``20``, (20, True) for ``20%``."""
+
+    name = "share"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[float, bool]:
+        """Read one; click reports what is none."""
+        if isinstance(value, tuple):
+            return value
+        text = str(value).strip()
+        percent = text.endswith("%")
+        try:
+            number = float(text.removesuffix("%"))
+        except ValueError:
+            number = -1.0
+        if not 0 <= number < (100.1 if percent else 1e9):
+            self.fail(f"{value!r} is neither a number of grasps nor a percentage")
+        return number, percent
 
 
 @click.command("rank")
@@ -65,7 +90,7 @@ AXES = ("+x", "-x", "+y", "-y", "+z", "-z")
 )
 @click.option(
     "--min-reachable",
-    type=options.SHARE,
+    type=ShareType(),
     metavar="N|P%",
     help="Exit with 1 if a list has fewer reachable grasps: a number, or a percentage.",
 )
@@ -79,14 +104,6 @@ def command(
     grasps: tuple[str, ...],
     map_path: Path,
     output: Path | None,
-    weights: tuple[float, float, float],
-    likeness: float,
-    margins: tuple[tuple[str, float], ...],
-    normalise: Literal["quantile", "max"],
-    planning_time: Literal["checks", "measured"],
-    neighbours: int,
-    roll: Literal["as-given", "free", "fixed"],
-    max_angle: float | None,
     format_name: str | None,
     frame: str | None,
     frame_pose: tuple[float, ...] | None,
@@ -101,6 +118,8 @@ def command(
     min_reachable: tuple[float, bool] | None,
     fail_if_none_reachable: bool,
     overwrite: bool,
+    settings: RankSettings,
+    basis: CostBasis,
 ) -> None:
     """Re-order grasp lists by cost, using the bin map alone.
 
@@ -116,7 +135,6 @@ def command(
     """
     _check_options(cell, output, chart, explain)
     from reachmap.cli.text.rank import ranking_tables
-    from reachmap.ranking.lookup.settings import CostBasis, RankSettings
     from reachmap.tools.rank import ListFormat, rank
 
     to_stdout = output is None or str(output) == "-"
@@ -124,15 +142,8 @@ def command(
         grasps,
         map_path=map_path,
         output=None if to_stdout else output,
-        settings=RankSettings(
-            weights=weights,
-            likeness=likeness,
-            margins=dict(margins),
-            neighbours=neighbours,
-            roll=roll,
-            max_angle_deg=max_angle,
-        ),
-        basis=CostBasis(normalise=normalise, planning_time=planning_time),
+        settings=settings,
+        basis=basis,
         list_format=ListFormat(
             name=format_name,
             frame=frame,

@@ -13,6 +13,7 @@ from reachmap.cli.options import (
     INPUT_FILE,
     OUTPUT_PATH,
     Decorator,
+    into_run,
     json_option,
     output_option,
     overwrite_option,
@@ -21,6 +22,7 @@ from reachmap.cli.options import (
     workers_option,
 )
 from reachmap.cli.quantities import ERROR_SIZE, QuantityCommand
+from reachmap.runtime.options import RunOptions
 
 NONE = (0.0, 0.0)
 
@@ -71,6 +73,7 @@ def _size_option(name: str, help: str) -> Decorator[Any]:
 @overwrite_option
 @progress_option
 @json_option
+@into_run
 def command(
     bin_map: Path,
     bin_size: tuple[float, float],
@@ -81,10 +84,8 @@ def command(
     output: Path,
     picture: Path | None,
     seed: int | None,
-    workers: int,
-    overwrite: bool,
-    progress: bool,
     as_json: bool,
+    run: RunOptions,
 ) -> None:
     """Say which grasps survive when bin, camera or tool are off.
 
@@ -99,7 +100,6 @@ def command(
     from reachmap.maps.bytes.to_json import json_ready
     from reachmap.maps.robustness.summary import summarise_robustness
     from reachmap.robustness.errors import Errors, ErrorSize
-    from reachmap.runtime.options import RunOptions
     from reachmap.tools.robust import robust
 
     if margin[1]:
@@ -116,7 +116,7 @@ def command(
         margin_m=margin[0],
         seed=seed,
         picture=picture,
-        run=RunOptions(workers=workers, overwrite=overwrite, quiet=not progress),
+        run=run,
     )
     summary = summarise_robustness(found)
     if as_json:

@@ -11,8 +11,8 @@ import click
 
 from reachmap.cli.options import (
     cell_argument,
-    check_workers,
     executor_option,
+    into_run,
     json_option,
     output_option,
     overwrite_option,
@@ -22,6 +22,7 @@ from reachmap.cli.options import (
     set_option,
     workers_option,
 )
+from reachmap.runtime.options import RunOptions
 
 OBJECTIVES = (
     "level_average",
@@ -78,15 +79,12 @@ OBJECTIVES = (
 @overwrite_option
 @progress_option
 @json_option
+@into_run
 def command(
     cell: str,
     output: Path,
-    workers: int,
-    executor: str,
-    restart: bool,
-    overwrite: bool,
-    progress: bool,
     as_json: bool,
+    run: RunOptions,
     **settings: Any,
 ) -> None:
     """Map variants of a cell, and say which change is more than noise.
@@ -98,25 +96,12 @@ def command(
 
     Example: reachmap study ur5-eye-in-hand --vary tube_length=0.119,0.219,0.319
     """
-    check_workers(executor)
     from reachmap.cli.text.study import study_lines
     from reachmap.maps.bytes.to_json import json_ready
     from reachmap.maps.summary.study import summarise_study
-    from reachmap.runtime.options import RunOptions
     from reachmap.tools.study import require_feasible, study
 
-    result = study(
-        cell,
-        output,
-        run=RunOptions(
-            workers=workers,
-            executor=executor,
-            restart=restart,
-            overwrite=overwrite,
-            quiet=not progress,
-        ),
-        **settings,
-    )
+    result = study(cell, output, run=run, **settings)
     summary = summarise_study(result)
     if as_json:
         click.echo(json.dumps(json_ready({"output": str(output)} | asdict(summary))))

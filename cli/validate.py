@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING
 
 import click
 
 from reachmap.cli import options
 from reachmap.cli.options import list_options
+from reachmap.runtime.options import RunOptions
+
+if TYPE_CHECKING:
+    from reachmap.ranking.lookup.settings import CostBasis, RankSettings
 
 
 @click.command("validate")
@@ -59,11 +63,7 @@ from reachmap.cli.options import list_options
 @options.output_option(help="Write the results of every grasp here, as JSON.")
 @options.set_option
 @options.seed_option
-@options.workers_option
-@options.executor_option
-@options.overwrite_option
-@options.progress_option
-@options.json_option
+@options.run_options
 def command(
     map_path: Path,
     grasps: tuple[str, ...],
@@ -71,14 +71,6 @@ def command(
     repeats: int | None,
     rolls: int,
     top: int,
-    weights: tuple[float, float, float],
-    likeness: float,
-    margins: tuple[tuple[str, float], ...],
-    normalise: Literal["quantile", "max"],
-    planning_time: Literal["checks", "measured"],
-    max_angle: float | None,
-    neighbours: int,
-    roll: Literal["as-given", "free", "fixed"],
     format_name: str | None,
     frame: str | None,
     chart: Path | None,
@@ -86,11 +78,10 @@ def command(
     output: Path | None,
     overrides: tuple[str, ...],
     seed: int | None,
-    workers: int,
-    executor: str,
-    overwrite: bool,
-    progress: bool,
     as_json: bool,
+    settings: RankSettings,
+    basis: CostBasis,
+    run: RunOptions,
 ) -> None:
     """Test a bin map against real planning to real grasps.
 
@@ -109,10 +100,7 @@ def command(
         options.unused("format_name", "frame", because="needs GRASPS")
     if output is None and chart is None and not calibrate:
         options.unused("overwrite", because="needs --output, --chart or --calibrate")
-    options.check_workers(executor)
     from reachmap.cli.text.validate import validation_text
-    from reachmap.ranking.lookup.settings import CostBasis, RankSettings
-    from reachmap.runtime.options import RunOptions
     from reachmap.tools.rank import ListFormat
     from reachmap.tools.validate import PickOptions, validate
 
@@ -120,27 +108,15 @@ def command(
         map_path,
         grasps,
         random=random,
-        settings=RankSettings(
-            weights=weights,
-            likeness=likeness,
-            margins=dict(margins),
-            neighbours=neighbours,
-            roll=roll,
-            max_angle_deg=max_angle,
-        ),
-        basis=CostBasis(normalise=normalise, planning_time=planning_time),
+        settings=settings,
+        basis=basis,
         list_format=ListFormat(name=format_name, frame=frame),
         pick=PickOptions(rolls=rolls, repeats=repeats, seed=seed, overrides=overrides),
         top=top,
         output=output,
         chart=chart,
         calibrate=calibrate,
-        run=RunOptions(
-            workers=workers,
-            executor=executor,
-            overwrite=overwrite,
-            quiet=not progress,
-        ),
+        run=run,
     )
     click.echo(
         json.dumps(answer.facts) if as_json else validation_text(answer.validation)

@@ -14,6 +14,7 @@ from reachmap.cli.options import (
     scan_options,
 )
 from reachmap.cli.text.tables import facts_text
+from reachmap.runtime.options import RunOptions
 
 
 @click.command()
@@ -40,14 +41,9 @@ def command(
     output: Path,
     overrides: tuple[str, ...],
     seed: int | None,
-    workers: int,
-    executor: str,
-    shard: tuple[int, int] | None,
-    restart: bool,
-    overwrite: bool,
     dry_run: bool,
-    progress: bool,
     as_json: bool,
+    run: RunOptions,
 ) -> None:
     """Map what the arm reaches around its base.
 
@@ -57,8 +53,7 @@ def command(
 
     Example: reachmap workspace-scan ur5-eye-in-hand --seed 7
     """
-    check_scan_options(shard, executor, dry_run=dry_run)
-    from reachmap.runtime.options import RunOptions
+    check_scan_options(run, dry_run=dry_run)
     from reachmap.tools.options import written_by
     from reachmap.tools.workspace_scan import (
         estimate_workspace_scan,
@@ -66,14 +61,6 @@ def command(
         workspace_scan,
     )
 
-    run = RunOptions(
-        workers=workers,
-        executor=executor,
-        shard=shard,
-        restart=restart,
-        overwrite=overwrite,
-        quiet=not progress,
-    )
     if dry_run:
         facts = estimate_workspace_scan(
             cell,

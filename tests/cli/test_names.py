@@ -72,6 +72,7 @@ def test_an_input_that_is_no_file(command: str, name: str, here: Path) -> None:
     more["validate"] = ("grasps.json",)
     more["export"] = ("--all",)
     more["study"] = ("--vary", "seed=1,2")
+    more["robust"] = ("--tool", "2mm")
     arguments = (name, *more.get(command, ()))
     if command == "compare":
         arguments = (name, "bin.h5")

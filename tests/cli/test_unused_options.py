@@ -26,7 +26,7 @@ def run(command: str, **how: object) -> Result:
         ("rank g.json --explain a --top 3", "--top: --explain tells of one grasp."),
         ("validate bin.h5 --random 3 --frame bin", "--frame: needs GRASPS."),
         ("validate bin.h5 --random 3 --from suction", "--from: needs GRASPS."),
-        ("validate bin.h5 g.json --overwrite", "--overwrite: needs --output or --ch"),
+        ("validate bin.h5 g.json --overwrite", "--overwrite: needs --output, --ch"),
         ("compare a.h5 b.h5 --overwrite", "--overwrite: needs --picture."),
         ("cells --overwrite -o x", "--output, --overwrite: needs --export."),
         ("cells --export a.h5 --overwrite", "--overwrite: needs --output."),
