@@ -36,12 +36,13 @@ def base_links(loaded: LoadedCell) -> tuple[str, ...]:
 
 
 def stands_of(loaded: LoadedCell) -> tuple[str, ...]:
-    """Bodies on the world that may touch the arm's base, as what carries it does."""
-    links = {*base_links(loaded), "robot_base"}
+    """The mount, and bodies on the world that may touch the arm's base."""
+    links, mount = set(base_links(loaded)), loaded.cell.robot.mount
     return tuple(
         body.name
         for body in loaded.cell.bodies
-        if body.attach_to == WORLD and links.intersection(body.touch)
+        if body.attach_to == WORLD
+        and (links.intersection(body.touch) or (mount and body.name == mount.name))
     )
 
 
@@ -81,7 +82,7 @@ def seen_from(loaded: LoadedCell, T_world_frame: FloatArray) -> LoadedCell:
         update={
             "camera": camera,
             "bodies": bodies,
-            "robot": cell.robot.model_copy(update={"base_pose": base}),
+            "robot": cell.robot.model_copy(update={"base_pose": base, "mount": None}),
             "bin": _bin_in_world(cell, T @ T_world_bin_of(cell)),
             "workspace_scan": cell.workspace_scan.model_copy(update={"frame": WORLD}),
         }
@@ -112,7 +113,7 @@ def with_base_at(
     base = pose_of(T_world_base)
     moved = cell.model_copy(
         update={
-            "robot": cell.robot.model_copy(update={"base_pose": base}),
+            "robot": cell.robot.model_copy(update={"base_pose": base, "mount": None}),
             "bodies": tuple(
                 _carried(body, T_before, T_world_base) if body.name in stands else body
                 for body in cell.bodies

@@ -182,6 +182,8 @@ def fingerprint(
     del data["bin"]["carrier"]
     _reduce_cycle(cell, data)
     robot = data["robot"]
+    # Base pose and body stand for it.
+    robot.pop("mount", None)
     del robot["xacro_args"], robot["joint_limits"], robot["group"]
     hashes = {name: f"sha256:{digest}" for name, digest in files_sha256.items()}
     robot["urdf"] = sha256_text(_with_filenames(urdf, hashes, bare_names=True))

@@ -13,7 +13,11 @@ from reachmap.cell.files.resources import shipped_folder
 from reachmap.cell.filling import write_out_fill
 from reachmap.cell.loaded import LoadedCell, fingerprint
 from reachmap.cell.model.cell import Cell
-from reachmap.cell.mounting import check_bin_stands, leaning_levels
+from reachmap.cell.mounting import (
+    check_bin_stands,
+    leaning_levels,
+    write_out_mount,
+)
 from reachmap.cell.pick_cycle import check_part_choice
 from reachmap.cell.references import check_names, find_doubts
 from reachmap.cell.resolution import resolved_cell, validated
@@ -103,6 +107,7 @@ def cell_from_text(
     restore_expressions(document)
     apply_overrides(document, overrides, Cell)
     resolve_expressions(document)
+    write_out_mount(document)
     write_out_carrier(document)
     write_out_fill(document)
     check_part_choice(document)
@@ -247,6 +252,7 @@ def stored_cell(
     restore_expressions(document)
     apply_overrides(document, changes, Cell)
     resolve_expressions(document)
+    write_out_mount(document)
     write_out_carrier(document)
     write_out_fill(document)
     check_part_choice(document)

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import json
 from typing import Any
 
 import numpy as np
+from pydantic import ValidationError
 
 from reachmap.cell.files.urdf import UrdfDescription
 from reachmap.cell.model.cell import Cell
+from reachmap.cell.model.robot import MountSpec
 from reachmap.cell.text.data import at
 from reachmap.cell.text.yaml_reader import Document
 from reachmap.geometry import (
     UPRIGHT_RAD,
     inverse_transform,
     quaternion_wxyz_from_rotation,
+    rotation_from_rpy_deg,
     tilt_rad,
 )
 
@@ -47,6 +51,57 @@ def write_out_base_pose(
     data["robot"]["base_pose"] = {
         "xyz": T_root_base[:3, 3].tolist(),
         "quaternion_wxyz": quaternion_wxyz_from_rotation(T_root_base[:3, :3]).tolist(),
+    }
+
+
+def write_out_mount(document: Document) -> None:
+    """Set ``robot.base_pose`` and a body to what ``robot.mount`` stands for.
+
+    What is wrong with the mount itself is left to validation.
+    """
+    given = at(document.data, "robot", "mount")
+    bodies = at(document.data, "bodies")
+    if not isinstance(given, dict) or not isinstance(bodies, list | None):
+        return
+    try:
+        mount = MountSpec.model_validate_json(json.dumps(given), strict=True)
+    except (ValidationError, ValueError, RecursionError):
+        return
+    pose, body = _base_of(mount), _body_of(mount)
+    place = ("robot", "base_pose")
+    own = at(document.data, *place)
+    if place in document.places and own is not None and own != pose:
+        document.add(place, "robot.mount says another pose: give one of the two")
+    document.data["robot"]["base_pose"] = pose
+    if body is not None:
+        named = {at(item, "name"): item for item in bodies or []}
+        document.data["bodies"] = [*(named | {mount.name: body}).values()]
+
+
+def _base_of(mount: MountSpec) -> dict[str, Any]:
+    """The base pose, as the data of a cell have it."""
+    angles = [0.0, mount.lean_deg, mount.yaw_deg]
+    return {"xyz": [*mount.at, mount.height], "rpy_deg": angles}
+
+
+def _body_of(mount: MountSpec) -> dict[str, Any] | None:
+    """The body behind the base, None where there is none.
+
+    A pedestal stands upright however the base leans.
+    """
+    if mount.size is None:
+        return None
+    length, angles = mount.body_length, [0.0, mount.lean_deg, mount.yaw_deg]
+    if mount.kind == "pedestal":
+        angles[1] = 0.0
+    z_axis = rotation_from_rpy_deg(np.array(angles))[:, 2]
+    centre = np.array([*mount.at, mount.height]) - (mount.gap + length / 2) * z_axis
+    return {
+        "name": mount.name,
+        "attach_to": "world",
+        "shape": {"box": [*mount.size, length]},
+        "pose": {"xyz": (np.round(centre, 9) + 0.0).tolist(), "rpy_deg": angles},
+        "touch": list(mount.touch),
     }
 
 

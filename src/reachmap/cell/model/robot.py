@@ -4,13 +4,18 @@ from __future__ import annotations
 
 from typing import Annotated, ClassVar, Literal
 
-from pydantic import BeforeValidator, Field, WithJsonSchema
+from pydantic import BeforeValidator, Field, WithJsonSchema, model_validator
 
 from reachmap.cell.model.fields import (
+    Angle,
+    Coordinate,
     Finite,
     GrowingRecord,
+    Identifier,
     Interval,
+    Length,
     Name,
+    NonNegative,
     PoseSpec,
     Rates,
     Record,
@@ -84,6 +89,65 @@ class IkSpec(Record):
     )
 
 
+class MountSpec(Record):
+    """What carries the arm: base pose and body in one.
+
+    The base stands on a pedestal, sits on a wall with its z axis level, or hangs from
+    the ceiling; heights are those of robot_base above z = 0 of the world.
+    """
+
+    kind: Literal["pedestal", "wall", "ceiling"] = Field(
+        "pedestal", description="What the base is fixed to."
+    )
+    height: Coordinate = Field(description="Of robot_base in the world [m].")
+    at: tuple[Coordinate, Coordinate] = Field(
+        (0.0, 0.0), description="x and y of robot_base in the world [m]."
+    )
+    yaw_deg: Angle = Field(
+        0.0, description="Turn about the vertical; a wall faces this way [deg]."
+    )
+    tilt_deg: Angle = Field(
+        0.0, description="Lean beside that of the kind, towards the yaw [deg]."
+    )
+    size: tuple[Length, Length] | None = Field(
+        None, description="Sides of the body across the base [m]; null: no body."
+    )
+    length: Length | None = Field(
+        None,
+        description="Of the body [m]; default: down to the floor for a pedestal, else "
+        "0.1.",
+    )
+    gap: NonNegative = Field(
+        0.002, le=0.5, description="Between robot_base and the body [m]."
+    )
+    name: Identifier = Field("mount", description="Of the body.")
+    touch: tuple[Name, ...] = Field(
+        (), description="Links and bodies that the body may touch."
+    )
+
+    @model_validator(mode="after")
+    def _has_a_body(self) -> MountSpec:
+        if self.size is not None and self.body_length <= 0.0:
+            raise ValueError(
+                f"a pedestal of height {self.height:g} has no length above the floor"
+            )
+        return self
+
+    @property
+    def body_length(self) -> float:
+        """Length of the body [m]."""
+        if self.length is not None:
+            return self.length
+        return self.height - self.gap if self.kind == "pedestal" else 0.1
+
+    @property
+    def lean_deg(self) -> float:
+        """How far z of the base leans from the vertical, towards the yaw [deg]."""
+        return {"pedestal": 0.0, "wall": 90.0, "ceiling": 180.0}[self.kind] + (
+            self.tilt_deg
+        )
+
+
 def _as_text(value: object) -> object:
     if isinstance(value, bool):
         return str(value).lower()
@@ -97,8 +161,10 @@ XacroValue = Annotated[
 ]
 
 
-class RobotSpec(Record):
+class RobotSpec(GrowingRecord):
     """The arm: URDF and what the URDF does not say."""
+
+    later: ClassVar[tuple[str, ...]] = ("mount",)
 
     urdf: Reference = Field(
         description="URDF or xacro file: package://, absolute, or relative to the cell."
@@ -126,6 +192,10 @@ class RobotSpec(Record):
         None, description="URDF frame called robot_base; default: the root link."
     )
     base_pose: PoseSpec = Field(PoseSpec(), description="robot_base in world.")
+    mount: MountSpec | None = Field(
+        None,
+        description="What carries the arm, in place of base_pose and of a body.",
+    )
     tcp: TcpSpec = Field(description="Tool centre point.")
     joint_limits: Reference | None = Field(
         None, description="MoveIt joint_limits.yaml, used where limits says nothing."

@@ -29,6 +29,11 @@ def cell_yaml(cell: Cell, *, comment: str = "") -> str:
     head = [f"# {line}".rstrip() for line in comment.splitlines()]
     changed = cell.model_dump(mode="json", exclude_defaults=True)
     data = _without_empty(cell.model_dump(mode="json"), changed)
+    mount = cell.robot.mount
+    if mount is not None:
+        # Both follow from the mount, which could not be changed beside them.
+        del data["robot"]["base_pose"]
+        data["bodies"] = [b for b in data["bodies"] if b["name"] != mount.name]
     return "\n".join([*head, *_mapping(data, 0)]) + "\n"
 
 
