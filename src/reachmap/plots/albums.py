@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
+from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from reachmap._typing import FloatArray
 from reachmap.errors import SettingsError
@@ -44,6 +46,10 @@ from reachmap.plots.study import draw_grid, draw_main_effects
 # How close a height must be to a level to mean it [m].
 LEVEL_TOLERANCE = 1e-3
 
+CANDIDATE_COLUMNS = (
+    "x [m]", "y [m]", "z [m]", "yaw [deg]", "score [%]", "worst point [%]", "why not",
+)  # fmt: skip
+
 
 def workspace_album(
     workspace: WorkspaceMap,
@@ -78,35 +84,33 @@ def workspace_album(
         for level in levels:
             items += _level_items(stack, level, percent_map, tables)
         if not heights:
-            items.append(
-                Picture(
-                    name=f"{quantity}_overview",
-                    title=f"{QUANTITY_NAMES[quantity]} on all levels",
-                    draw=partial(draw_overview, stack, percent_map=percent_map),
-                )
-            )
+            title = f"{QUANTITY_NAMES[quantity]} on all levels"
+            name = f"{quantity}_overview"
+            style = {"percent_map": percent_map}
+            items.append(_picture(name, title, draw_overview, stack, **style))
     if not heights:
         items.append(_causes_picture(workspace, "causes"))
     return items
 
 
+def _picture(
+    name: str, title: str, draw: Callable[..., Figure], *arguments: Any, **styles: Any
+) -> Picture:
+    """Name a picture that is drawn when it is wanted."""
+    return Picture(name=name, title=title, draw=partial(draw, *arguments, **styles))
+
+
 def _causes_picture(record: WorkspaceMap | BinMap, name: str) -> Picture:
-    return Picture(
-        name=name,
-        title="States of the test frames, and what is in the way",
-        draw=partial(draw_causes, record),
-    )
+    title = "States of the test frames, and what is in the way"
+    return _picture(name, title, draw_causes, record)
 
 
 def _level_items(
     stack: LevelStack, level: int, percent_map: PercentMap, tables: bool
 ) -> list[Picture | Table]:
     name = f"{stack.quantity}_z{level_names(stack.z)[level]}"
-    picture = Picture(
-        name=name,
-        title=level_title(stack, level),
-        draw=partial(draw_level, stack, level, percent_map=percent_map),
-    )
+    title, style = level_title(stack, level), {"percent_map": percent_map}
+    picture = _picture(name, title, draw_level, stack, level, **style)
     if not tables:
         return [picture]
     text = level_table(stack.x, stack.y, stack.values[level])
@@ -155,61 +159,43 @@ def bin_album(
     items: list[Picture | Table] = []
     for layer, height in enumerate(level_names(bin_map.layer)):
         end = f"_layer{height}" if bin_map.layer.size > 1 else ""
-        items += [
-            Picture(
-                name=f"bin_reachability{end}",
-                title="Path reachability in the bin",
-                draw=partial(
-                    draw_reachability, bin_map, layer, percent_map=percent_map
-                ),
-            ),
-            Picture(
-                name=f"bin_directions{end}",
-                title="Path reachability of test grasps, directions and points",
-                draw=partial(draw_directions, bin_map, layer, percent_map=percent_map),
-            ),
-            Picture(
-                name=f"bin_costs{end}",
-                title="What reaching into the bin costs",
-                draw=partial(draw_costs, bin_map, cost, layer),
-            ),
-            Picture(
-                name=f"bin_approach{end}",
-                title="Which approach directions and rolls work where",
-                draw=partial(draw_approach, bin_map, layer),
-            ),
-        ]
-        if bin_map.margins is not None:
-            items.append(
-                Picture(
-                    name=f"bin_clearance{end}",
-                    title="Clearance on the way in",
-                    draw=partial(draw_clearance, bin_map, layer),
-                )
-            )
+        items += _layer_pictures(bin_map, cost, layer, end, percent_map)
         if tables:
             repeats = bin_map.path_found.shape[-1]
             values = percent_after(bin_map, repeats)[layer]
             text = level_table(bin_map.x, bin_map.y, values)
             items.append(Table(name=f"bin_reachability{end}", text=text))
     if are_independent(bin_map):
-        items.append(
-            Picture(
-                name="bin_saturation",
-                title="Test grasps reached over the number of attempts",
-                draw=partial(draw_saturation, bin_map),
-            )
-        )
+        title = "Test grasps reached over the number of attempts"
+        items.append(_picture("bin_saturation", title, draw_saturation, bin_map))
     emptying = emptying_of(bin_map)
     if emptying is not None:
-        items.append(
-            Picture(
-                name="bin_emptying",
-                title=f"Emptying: {emptying.sentence}",
-                draw=partial(draw_emptying, bin_map, emptying),
-            )
-        )
+        title = f"Emptying: {emptying.sentence}"
+        items.append(_picture("bin_emptying", title, draw_emptying, bin_map, emptying))
     return [*items, _causes_picture(bin_map, "bin_causes")]
+
+
+def _layer_pictures(
+    bin_map: BinMap,
+    cost: FloatArray | None,
+    layer: int,
+    end: str,
+    percent_map: PercentMap,
+) -> Iterator[Picture]:
+    style = {"percent_map": percent_map}
+    title = "Path reachability in the bin"
+    name = f"bin_reachability{end}"
+    yield _picture(name, title, draw_reachability, bin_map, layer, **style)
+    title = "Path reachability of test grasps, directions and points"
+    name = f"bin_directions{end}"
+    yield _picture(name, title, draw_directions, bin_map, layer, **style)
+    title = "What reaching into the bin costs"
+    yield _picture(f"bin_costs{end}", title, draw_costs, bin_map, cost, layer)
+    title = "Which approach directions and rolls work where"
+    yield _picture(f"bin_approach{end}", title, draw_approach, bin_map, layer)
+    if bin_map.margins is not None:
+        title = "Clearance on the way in"
+        yield _picture(f"bin_clearance{end}", title, draw_clearance, bin_map, layer)
 
 
 def placement_album(
@@ -224,16 +210,14 @@ def placement_album(
 
     ``camera_view``, shape (n, 2), is drawn as an outline in robot_base [m].
     """
-    picture = Picture(
-        name="placement",
-        title=placement_words(placement)[0],
-        draw=partial(
-            draw_placement,
-            placement,
-            workspace,
-            camera_view=camera_view,
-            percent_map=percent_map,
-        ),
+    picture = _picture(
+        "placement",
+        placement_words(placement)[0],
+        draw_placement,
+        placement,
+        workspace,
+        camera_view=camera_view,
+        percent_map=percent_map,
     )
     if not tables:
         return [picture]
@@ -244,36 +228,18 @@ def comparison_album(
     maps: MapChange, *, percent_map: PercentMap = "RdYlGn"
 ) -> list[Picture | Table]:
     """List the pictures of two maps: the level that changed most, then all levels."""
-    one = Picture(
-        name="comparison",
-        title=maps.headline,
-        draw=partial(draw_comparison, maps, percent_map=percent_map),
-    )
+    name, title, style = "comparison", maps.headline, {"percent_map": percent_map}
+    one = _picture(name, title, draw_comparison, maps, **style)
     if maps.z.size == 1:
         return [one]
-    sheet = Picture(
-        name="comparison_overview",
-        title=maps.headline,
-        draw=partial(draw_change_sheet, maps),
-    )
-    return [one, sheet]
+    return [one, _picture("comparison_overview", title, draw_change_sheet, maps)]
 
 
 def _candidate_table(placement: BinPlacement) -> str:
     """CSV of all candidates, the best first and the excluded ones last."""
     stream = io.StringIO(newline="")
     writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(
-        [
-            "x [m]",
-            "y [m]",
-            "z [m]",
-            "yaw [deg]",
-            "score [%]",
-            "worst point [%]",
-            "why not",
-        ]
-    )
+    writer.writerow(CANDIDATE_COLUMNS)
     for index in np.argsort(-np.nan_to_num(placement.score, nan=-1.0), kind="stable"):
         x, y, z, yaw = placement.candidate_pose[index]
         numbers = (placement.score[index], placement.worst_point[index])
@@ -295,29 +261,24 @@ def study_album(
     items: list[Picture | Table] = []
     is_table = study.design == "grid" and len(study.parameter_names) == 2
     for k, name in enumerate(study.objective_names):
-        effects = partial(draw_main_effects, study, k)
         title = f"Main effects on {name}"
-        items.append(Picture(name=f"effects_{name}", title=title, draw=effects))
+        items.append(_picture(f"effects_{name}", title, draw_main_effects, study, k))
         if is_table:
-            draw = partial(draw_grid, study, k, percent_map)
-            items.append(Picture(name=f"grid_{name}", title=name, draw=draw))
+            items.append(
+                _picture(f"grid_{name}", name, draw_grid, study, k, percent_map)
+            )
     return items
 
 
 def robustness_album(record: Robustness) -> list[Picture | Table]:
     """List the picture of what errors cost."""
-    return [
-        Picture(
-            name="robustness",
-            title="Reachability over the errors of the cell",
-            draw=partial(draw_robustness, record),
-        )
-    ]
+    title = "Reachability over the errors of the cell"
+    return [_picture("robustness", title, draw_robustness, record)]
 
 
 def base_album(
     placement: BasePlacement, *, percent_map: PercentMap = "RdYlGn"
 ) -> list[Picture | Table]:
     """List the picture of a place of an arm."""
-    draw = partial(draw_base, placement, percent_map)
-    return [Picture(name="robot", title="Where the arm goes", draw=draw)]
+    title = "Where the arm goes"
+    return [_picture("robot", title, draw_base, placement, percent_map)]
