@@ -15,9 +15,10 @@ from reachmap.sampling.frames import (
 from reachmap.scans.bin_scan import plan_from_scratch
 from reachmap.scans.ik_survey import survey_frames
 from reachmap.scans.workspace_per_frame import plan_frames
-from reachmap.scans.workspace_roadmap import connect_survey, path_to_frame
+from reachmap.scans.workspace_roadmap import connect_survey
 from tests.support.dense_checks import dense_free
 from tests.support.optional import present
+from tests.support.roadmap_paths import path_to_frame
 from tests.support.scenes import scene_of
 
 SAMPLE = 300

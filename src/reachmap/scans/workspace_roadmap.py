@@ -195,29 +195,3 @@ def component_of_frames(survey: Survey, connection: Connection) -> IntArray:
     best = _best_goal(survey.frame, length, groups)
     of_groups = _component_of_frames(survey.frame, connection, best, groups)
     return np.asarray(survey.by_frame(of_groups))
-
-
-def path_to_frame(
-    survey: Survey, connection: Connection, frame: int
-) -> FloatArray | None:
-    """Path from the scan configuration to a frame over verified motions.
-
-    Parameters
-    ----------
-    survey : Survey
-    connection : Connection
-        Of the same survey.
-    frame : int
-
-    Returns
-    -------
-    array, shape (n, dof), or None
-        The shortest in the roadmap, not shortened further; None where the frame is
-        not connected.
-    """
-    paths = connection.roadmap.shortest_paths()
-    nodes = connection.roadmap.shortest_to_goals(paths)[survey.goals_of(frame)]
-    lengths = paths.length_rad[nodes]
-    if not len(nodes) or not np.isfinite(lengths).any():
-        return None
-    return paths.path_to(int(nodes[np.argmin(lengths)]))

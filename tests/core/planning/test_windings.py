@@ -18,7 +18,8 @@ from reachmap.core.scene import Scene
 from reachmap.maps import Status
 from reachmap.sampling.frames import approach_distance_m, bin_test_frames
 from reachmap.scans.ik_survey import survey_frames
-from reachmap.scans.workspace_roadmap import connect_survey, path_to_frame
+from reachmap.scans.workspace_roadmap import connect_survey
+from tests.support.roadmap_paths import path_to_frame
 
 TOY = Path(__file__).parents[3] / "cells"
 HARD = Path(__file__).parents[3] / "benchmarks" / "hard_cells"

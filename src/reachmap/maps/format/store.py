@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import dataclasses
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Generic, TypeVar
+
+import numpy as np
 
 from reachmap.errors import EngineError, MapFileError, ReachmapError
 from reachmap.maps.bytes.hashing import content_sha256, integrity_sha256
@@ -26,7 +28,7 @@ from reachmap.maps.bytes.integrity import (
 )
 from reachmap.maps.bytes.isolation import isolated
 from reachmap.maps.bytes.publish import publish
-from reachmap.maps.bytes.tree import Tree
+from reachmap.maps.bytes.tree import Leaf, Tree
 from reachmap.maps.format.contract import check_ranges, check_structure
 from reachmap.maps.format.layout import (
     FORMAT_VERSION,
@@ -34,7 +36,6 @@ from reachmap.maps.format.layout import (
     Layout,
     kind_of_format,
 )
-from reachmap.maps.format.upgrade import upgraded
 
 OPEN_ELSEWHERE = (
     "open for writing in another program, or left so by one that crashed; close it "
@@ -46,7 +47,7 @@ MAX_PROBLEMS = 8
 Record = TypeVar("Record")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclasses.dataclass(frozen=True, slots=True, kw_only=True)
 class RecordFile(Generic[Record]):
     """Records of one kind as files.
 
@@ -146,7 +147,7 @@ def load(path: Path, *layouts: Layout) -> tuple[Tree, Layout]:
     found = identify(path, identity, layouts)
     problems = check_hashes(tree)[:1]
     if not problems:
-        tree = upgraded(tree)
+        tree = _upgraded(tree)
         problems = check_tree(tree, found)
     if problems and is_open_for_writing(image):
         raise MapFileError(f"{path}: {OPEN_ELSEWHERE}")
@@ -163,6 +164,38 @@ def _read(image: bytes) -> tuple[dict[str, str], Tree]:
     identity = identity_from_image(image)
     is_ours = kind_of_format(identity.get("format")) is not None
     return identity, tree_from_image(image) if is_ours else Tree()
+
+
+def _upgraded(tree: Tree) -> Tree:
+    """A tree of version 1.0 as version 1.1 has it; any other as it is.
+
+    Joints were counted instead of named, and the dimensions of cubes were called like
+    those of the root. Nothing else changed its form.
+    """
+    if tree.attributes.get("format_version") != "1.0":
+        return tree
+    leaves = dict(tree.leaves)
+    joint = leaves.get("joint")
+    if joint is not None and joint.dims == ("joint",):
+        names = np.array(joint.attributes.get("joint_names", ()), str)
+        leaves["joint"] = dataclasses.replace(joint, value=names)
+    for path, leaf in tree.leaves.items():
+        if path.startswith("cubes/"):
+            leaves.update(_renamed(path, leaf))
+    return dataclasses.replace(tree, leaves=leaves)
+
+
+def _renamed(path: str, leaf: Leaf) -> dict[str, Leaf]:
+    dims = tuple(
+        f"cube_{name}" if name in ("x", "y", "z") else name for name in leaf.dims
+    )
+    group, _, name = path.rpartition("/")
+    if leaf.dims != (name,) or name == dims[0]:
+        return {path: dataclasses.replace(leaf, dims=dims)}
+    return {
+        path: dataclasses.replace(leaf, is_hidden=True),
+        f"{group}/cube_{name}": dataclasses.replace(leaf, dims=dims),
+    }
 
 
 def check_tree(tree: Tree, layout: Layout) -> list[str]:

@@ -21,7 +21,6 @@ REACH_SAMPLES, REACH_SLACK = 500, 1.02
 STEPS_IN_REACH, LEAST_STEP_M = 7, 0.10
 # Heights beside the present one that are looked at by default [m].
 HEIGHTS_M = 0.30
-RAIL_STEPS = 12
 
 
 def reach_m(kinematics: Kinematics) -> float:
