@@ -176,6 +176,7 @@ class Scene:
             checker=checker,
             motions=motions,
             planner=Planner(motions, cell.planner),
+            time_law=dataclasses.replace(self.time_law, motions=motions),
             load=load,
         )
 

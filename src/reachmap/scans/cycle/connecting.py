@@ -9,7 +9,6 @@ import numpy as np
 from reachmap._typing import FloatArray, IntArray
 from reachmap.core.kinematics.windings import Windings
 from reachmap.core.planning.routes import shorten_until
-from reachmap.core.planning.timing import execution_time_s
 from reachmap.core.scene import Scene
 from reachmap.maps.records import NO_PAIR
 from reachmap.runtime.progress import Progress
@@ -95,12 +94,5 @@ def path_over(
 def quickest(scene: Scene, ways: list[FloatArray], seed: int) -> FloatArray | None:
     """The way that takes the least time when all are shortened; None of none."""
     rng, spec = np.random.default_rng(seed), scene.loaded.cell.roadmap
-    robot = scene.robot
     short = [shorten_until(w, scene.motions, rng, spec.least_gain) for w in ways]
-    return min(
-        short,
-        key=lambda path: execution_time_s(
-            path, robot.velocity_rad_s, robot.acceleration_rad_s2
-        ),
-        default=None,
-    )
+    return min(short, key=scene.time_law.path_time_s, default=None)

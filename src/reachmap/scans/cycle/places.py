@@ -93,6 +93,7 @@ def find_places(
     progress : Progress
     """
     cell, dof = scenes.empty.loaded.cell, scenes.empty.robot.dof
+    law = scenes.empty.time_law
     status, pairs = [], []
     found: list[tuple[int, FloatArray, FloatArray]] = []
     for number, spec in enumerate(cell.drop_offs):
@@ -114,9 +115,9 @@ def find_places(
         time_s=np.array(
             [
                 (
-                    scenes.straight_time_s(entry[1]),
-                    scenes.straight_time_s(entry[2]),
-                    scenes.planned_time_s(entry[3]),
+                    law.way_time_s(entry[1]),
+                    law.way_time_s(entry[2]),
+                    law.path_time_s(entry[3]),
                 )
                 for entry in kept
             ]

@@ -119,7 +119,7 @@ class CyclePlanner:
         self._places = shared.places
         self._transfers = Transfers(scenes, shared.places, shared.hubs)
         self._windings = Windings(scenes.empty.robot)
-        self._cell = scenes.empty.loaded.cell
+        self._cell, self._law = scenes.empty.loaded.cell, scenes.empty.time_law
         self.stages = len(stages_of(scenes.empty.loaded))
         self._goes_somewhere = self.stages > 1
 
@@ -184,7 +184,6 @@ class CyclePlanner:
 
     def _over(self, grasp: int, goal: int, found: Sequence[WayIn]) -> _Candidate | None:
         """The cycle over one goal: its quickest way in, and what follows."""
-        scenes = self._scenes
         timed = [
             (self._in_s(way), k)
             for k, way in enumerate(found)
@@ -205,14 +204,14 @@ class CyclePlanner:
             way_in=way_in,
             in_s=self._in_s(way_in),
             lift=lift,
-            lift_s=scenes.straight_time_s(lift),
+            lift_s=self._law.way_time_s(lift),
             transfer=transfer,
         )
 
     def _in_s(self, way: WayIn) -> float:
-        scenes, begin = self._scenes, max(way.planned - 1, 0)
-        return scenes.planned_time_s(way.path[: way.planned]) + (
-            scenes.straight_time_s(way.path[begin:])
+        begin = max(way.planned - 1, 0)
+        return self._law.path_time_s(way.path[: way.planned]) + (
+            self._law.way_time_s(way.path[begin:])
         )
 
     def _lift_at(self, goal: int, q: FloatArray) -> FloatArray | None:
@@ -279,7 +278,7 @@ class CyclePlanner:
         """Time and length of the shortest lift of some goals."""
         lifts = [self._lifts.ways[int(goal)] for goal in goals]
         lift = min(lifts, key=path_length_rad)
-        return self._scenes.straight_time_s(lift), path_length_rad(lift)
+        return self._law.way_time_s(lift), path_length_rad(lift)
 
     def _without_place(self, goals: IntArray) -> CyclePlan:
         """No drop-off can be used: the stage that fails, and the bodies in the way."""

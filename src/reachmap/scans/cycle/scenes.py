@@ -10,7 +10,6 @@ import numpy as np
 from reachmap._typing import FloatArray
 from reachmap.core.collision.bodies import BOTTOM, HEAP, SHELL
 from reachmap.core.collision.held_part import HeldPart
-from reachmap.core.planning.timing import execution_time_s, smooth_way_time_s
 from reachmap.core.scene import Scene
 from reachmap.errors import SceneError
 
@@ -62,22 +61,13 @@ class CycleScenes:
         lain_on = (f"part | {name}" for name in (BOTTOM, HEAP, SHELL))
         return tuple(dict.fromkeys([*names, *lain_on]))
 
-    @property
-    def limits(self) -> tuple[FloatArray, FloatArray]:
-        """Velocities and accelerations [rad/s], [rad/s²]."""
-        return self.empty.robot.velocity_rad_s, self.empty.robot.acceleration_rad_s2
-
-    def planned_time_s(self, path: FloatArray) -> float:
-        """Time of a planned path, shape (n, dof)."""
-        return execution_time_s(path, *self.limits)
-
-    def straight_time_s(self, way: FloatArray) -> float:
-        """Time of a straight way of the tool, shape (n, dof)."""
-        return smooth_way_time_s(way, *self.limits)
-
     def least_times_s(self, q: FloatArray, Q: FloatArray) -> FloatArray:
-        """Times below which no path between configurations stays, (n, dof) to (n,)."""
-        v, a = self.limits
+        """Times below which no path between configurations stays, (n, dof) to (n,).
+
+        Whatever the time law: each joint has to go its way, from rest to rest.
+        """
+        robot = self.empty.robot
+        v, a = robot.velocity_rad_s, robot.acceleration_rad_s2
         change = np.abs(Q - q)
         ramps = 2.0 * np.sqrt(change / a)
         cruise = change / v + v / a

@@ -194,7 +194,7 @@ class Transfers:
         return min(found, key=lambda transfer: transfer.total_s)
 
     def _transfer(self, path: FloatArray, place: int) -> Transfer:
-        time_s = self._scenes.planned_time_s(path)
+        time_s = self._scene.time_law.path_time_s(path)
         return Transfer(
             path=path,
             place=place,

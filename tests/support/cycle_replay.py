@@ -1,0 +1,312 @@
+"""A cycle replayed by code that shares nothing with the planner.
+
+Kinematics from the XML of the URDF, meshes by trimesh, the cell from its JSON, pairs
+one by one with coal: no Pinocchio, no broadphase, no margin.
+"""
+
+from __future__ import annotations
+
+import json
+import xml.etree.ElementTree as ET
+from itertools import combinations
+from typing import Any
+
+import coal
+import numpy as np
+import trimesh
+from scipy.spatial.transform import Rotation
+
+WORLD = ""
+
+
+def pose(xyz: Any = (0, 0, 0), rpy: Any = (0, 0, 0), degrees: bool = False) -> Any:
+    """Homogeneous matrix of a translation and fixed-axis angles."""
+    T = np.eye(4)
+    T[:3, :3] = Rotation.from_euler("xyz", rpy, degrees=degrees).as_matrix()
+    T[:3, 3] = xyz
+    return T
+
+
+def pose_of(spec: dict[str, Any]) -> Any:
+    """Homogeneous matrix of a pose of the cell."""
+    T = pose(spec["xyz"], spec.get("rpy_deg") or (0, 0, 0), degrees=True)
+    if spec.get("quaternion_wxyz"):
+        w, x, y, z = spec["quaternion_wxyz"]
+        T[:3, :3] = Rotation.from_quat([x, y, z, w]).as_matrix()
+    return T
+
+
+def numbers(element: ET.Element | None, name: str) -> Any:
+    """Numbers of an attribute, zeros where it is missing."""
+    text = None if element is None else element.get(name)
+    return np.array([float(v) for v in (text or "0 0 0").split()])
+
+
+def primitive(shape: dict[str, Any]) -> Any:
+    """Coal's shape of a primitive of the cell."""
+    if shape.get("box"):
+        return coal.Box(*shape["box"])
+    if shape.get("sphere"):
+        return coal.Sphere(shape["sphere"]["radius"])
+    kind = "cylinder" if shape.get("cylinder") else "capsule"
+    value = shape[kind]
+    made = {"cylinder": coal.Cylinder, "capsule": coal.Capsule}[kind]
+    return made(value["radius"], value["length"])
+
+
+def surface(path: Any, scale: Any) -> Any:
+    """Coal's triangles of a mesh file."""
+    mesh = trimesh.load(path, force="mesh")
+    body = coal.BVHModelOBBRSS()
+    body.beginModel(len(mesh.faces), len(mesh.vertices))
+    body.addVertices(np.ascontiguousarray(mesh.vertices * scale, float))
+    body.addTriangles(np.ascontiguousarray(mesh.faces, np.int64))
+    body.endModel()
+    return body
+
+
+class Replay:
+    """The bodies of a loaded cell, and where they are at a configuration."""
+
+    def __init__(self, loaded: Any, joint_names: Any) -> None:
+        self.cell = json.loads(loaded.resolved_json)
+        self.joint_names = list(joint_names)
+        root = ET.fromstring(loaded.urdf)
+        self.joints = {j.find("child").get("link"): j for j in root.findall("joint")}
+        self.names: list[str] = []
+        self.shapes: list[Any] = []
+        self.links: list[str] = []
+        self.offsets: list[Any] = []
+        for link in root.findall("link"):
+            for item in link.findall("collision"):
+                self._add_link(loaded, link.get("name"), item)
+        tip = self.cell["robot"]["tcp"]
+        self.T_tip_tcp = pose_of(tip)
+        self.tip = tip["parent"]
+        for body in self.cell["bodies"]:
+            where = WORLD if body["attach_to"] == "world" else body["attach_to"]
+            self._add(body["name"], where, pose_of(body["pose"]), body["shape"])
+        part = self.cell["part"]
+        self._add(
+            "part", self.tip, self.T_tip_tcp @ pose_of(part["pose"]), part["shape"]
+        )
+        self._add_bin()
+        self.pairs = [
+            p for p in combinations(range(len(self.names)), 2) if self._ok(*p)
+        ]
+        self._allow(loaded, root)
+
+    def _add_link(self, loaded: Any, name: str, item: ET.Element) -> None:
+        origin, geometry = item.find("origin"), item.find("geometry")[0]
+        T = pose(numbers(origin, "xyz"), numbers(origin, "rpy"))
+        if geometry.tag == "mesh":
+            scale = geometry.get("scale")
+            scale = [float(v) for v in scale.split()] if scale else 1.0
+            made = surface(loaded.mesh_paths[geometry.get("filename")], scale)
+        elif geometry.tag == "box":
+            made = coal.Box(*numbers(geometry, "size"))
+        else:
+            sizes = (float(geometry.get("radius")), float(geometry.get("length")))
+            made = coal.Cylinder(*sizes)
+        self._append(name, name, T, made)
+
+    def _add(self, name: str, link: str, T: Any, shape: dict[str, Any]) -> None:
+        self._append(name, link, T, primitive(shape))
+
+    def _append(self, name: str, link: str, T: Any, shape: Any) -> None:
+        self.names.append(name)
+        self.links.append(link)
+        self.offsets.append(T)
+        self.shapes.append(shape)
+
+    def _add_bin(self) -> None:
+        spec = self.cell["bin"]
+        x, y, z = spec["inner"]
+        wall = spec["wall"]
+        wx, wy = wall if isinstance(wall, list) else (wall, wall)
+        low = spec["bottom"] or min(wx, wy)
+        T = pose_of(spec["pose"])
+        if spec["frame"] == "robot_base":
+            T = pose_of(self.cell["robot"]["base_pose"]) @ T
+        self.T_world_bin = T
+        middle = (z - low) / 2
+        boxes = {"bin bottom": ((0, 0, -low / 2), (x, y, low))}
+        for s in (-1, 1):
+            sign = "+" if s > 0 else "-"
+            boxes[f"bin wall {sign}x"] = (
+                (s * (x + wx) / 2, 0, middle), (wx, y + 2 * wy, z + low))  # fmt: skip
+            boxes[f"bin wall {sign}y"] = (
+                (0, s * (y + wy) / 2, middle),
+                (x, wy, z + low),
+            )
+        if spec["heap"]:
+            boxes["bin heap"] = ((0, 0, spec["heap"] / 2), (x, y, spec["heap"]))
+        for name, (centre, sides) in boxes.items():
+            self._append(name, WORLD, T @ pose(centre), coal.Box(*sides))
+
+    def _rigid(self, link: str) -> str:
+        """The link whose joint moves a link, WORLD where none does."""
+        while link in self.joints:
+            if self.joints[link].get("name") in self.joint_names:
+                return link
+            link = self.joints[link].find("parent").get("link")
+        return WORLD
+
+    def _ok(self, a: int, b: int) -> bool:
+        return self._rigid(self.links[a]) != self._rigid(self.links[b])
+
+    def _allow(self, loaded: Any, root: ET.Element) -> None:
+        allowed = {
+            frozenset((j.find("parent").get("link"), j.find("child").get("link")))
+            for j in root.findall("joint")
+        }
+        for element in ET.fromstring(loaded.srdf or "<r/>").iter("disable_collisions"):
+            allowed.add(frozenset((element.get("link1"), element.get("link2"))))
+        for body in [*self.cell["bodies"], {"name": "part", **self.cell["part"]}]:
+            for other in body["touch"]:
+                named = [n for n in self.names if n == other or (
+                    other == "bin" and n.startswith("bin "))]  # fmt: skip
+                allowed |= {frozenset((body["name"], n)) for n in named}
+        self.pairs = [
+            (a, b)
+            for a, b in self.pairs
+            if frozenset((self.names[a], self.names[b])) not in allowed
+        ]
+
+    def placed(self, q: Any) -> list[Any]:
+        """World pose of every body."""
+        known = {WORLD: np.eye(4)}
+        values = dict(zip(self.joint_names, q, strict=True))
+        locked = self.cell["robot"]["locked_joints_deg"]
+        base = pose_of(self.cell["robot"]["base_pose"])
+
+        def of(link: str) -> Any:
+            if link not in known:
+                joint = self.joints.get(link)
+                if joint is None:
+                    known[link] = base
+                else:
+                    known[link] = of(joint.find("parent").get("link")) @ motion(joint)
+            return known[link]
+
+        def motion(joint: ET.Element) -> Any:
+            origin, name = joint.find("origin"), joint.get("name")
+            T = pose(numbers(origin, "xyz"), numbers(origin, "rpy"))
+            value = values.get(name, np.radians(locked.get(name, 0.0)))
+            if joint.get("type") in ("revolute", "continuous"):
+                axis = numbers(joint.find("axis"), "xyz")
+                turn = np.eye(4)
+                turn[:3, :3] = Rotation.from_rotvec(axis * value).as_matrix()
+                T = T @ turn
+            return T
+
+        return [of(link) @ T for link, T in zip(self.links, self.offsets, strict=True)]
+
+    def distances(self, q: Any, pairs: Any) -> list[float]:
+        """Signed distance of each of some pairs [m]."""
+        T = [transform(M) for M in self.placed(q)]
+        found = []
+        for a, b in pairs:
+            result = coal.DistanceResult()
+            request = coal.DistanceRequest(True)
+            coal.distance(self.shapes[a], T[a], self.shapes[b], T[b], request, result)
+            found.append(result.min_distance)
+        return found
+
+    def hits(self, q: Any, *, part: bool, skip: Any = ()) -> list[str]:
+        """Pairs that collide; without the part where it is not held."""
+        T = [transform(M) for M in self.placed(q)]
+        found = []
+        for a, b in self.pairs:
+            name = f"{self.names[a]} | {self.names[b]}"
+            if (not part and "part" in (self.names[a], self.names[b])) or name in skip:
+                continue
+            result = coal.CollisionResult()
+            if coal.collide(
+                self.shapes[a], T[a], self.shapes[b], T[b],
+                coal.CollisionRequest(), result,
+            ):  # fmt: skip
+                found.append(name)
+        return found
+
+    def pair(self, first: str, second: str) -> tuple[int, int]:
+        """Indices of two bodies."""
+        return self.names.index(first), self.names.index(second)
+
+    def tcp(self, q: Any) -> Any:
+        """World position of the TCP, (3,)."""
+        k = self.names.index("part")
+        back = np.linalg.inv(pose_of(self.cell["part"]["pose"]))
+        return (self.placed(q)[k] @ back)[:3, 3]
+
+
+def transform(T: Any) -> Any:
+    """Coal's form of a pose."""
+    return coal.Transform3s(
+        np.ascontiguousarray(T[:3, :3]), np.ascontiguousarray(T[:3, 3])
+    )
+
+
+def dense(path: Any, step_m: float, reach_m: float = 1.2) -> Any:
+    """Points along a path, none of the robot's moving more than a step between two.
+
+    ``reach_m`` is a distance from every joint that no point of the robot exceeds.
+    """
+    parts = [path[:1]]
+    for a, b in zip(path[:-1], path[1:], strict=True):
+        count = max(1, int(np.ceil(np.abs(b - a).sum() * reach_m / step_m)))
+        parts.append(a + np.arange(1, count + 1)[:, None] / count * (b - a))
+    return np.vstack(parts)
+
+
+def paths_by_stage(record: Any, grasp: Any) -> dict[int, Any]:
+    """Path of each stage of one test grasp; 0 is the way in of the best path."""
+    ends = np.cumsum(record.paths.row_size)
+    begins = ends - record.paths.row_size
+    rows = np.flatnonzero((record.paths.index[:, :4] == grasp).all(axis=1))
+    found = {}
+    for row in rows:
+        stage = int(record.paths.stage[row])
+        if stage or row == record.best.row[tuple(grasp)]:
+            found[stage] = record.paths.configuration[begins[row] : ends[row]]
+    return found
+
+
+def faults_of_cycle(loaded: Any, record: Any, grasp: Any, share: float = 1 / 3) -> list:
+    """Everything wrong with one stored cycle, in words."""
+    replay = Replay(loaded, record.joint_names)
+    cell, faults = replay.cell, []
+    step_m = share * cell["collision"]["verification_distance_m"]
+    stages = paths_by_stage(record, grasp)
+    for stage, path in sorted(stages.items()):
+        held = 1 <= stage <= 3
+        skip = ("part | bin bottom", "part | bin heap") if stage == 1 else ()
+        for q in dense(path, step_m):
+            hits = replay.hits(q, part=held, skip=skip)
+            if hits:
+                faults.append(f"stage {stage}: {hits}")
+                break
+        if stage > 0:
+            gap = np.abs(path[0] - stages[stage - 1][-1]).max()
+            if gap > 1e-9:
+                faults.append(f"stage {stage} begins {gap:g} rad off")
+    gap = np.abs(stages[max(stages)][-1] - stages[0][0]).max()
+    if gap > 1e-9:
+        faults.append(f"the cycle ends {gap:g} rad off its beginning")
+    return faults + contact_faults(replay, stages[1], step_m)
+
+
+def contact_faults(replay: Replay, lift: Any, step_m: float) -> list[str]:
+    """What the lift does to the bottom beyond its allowance."""
+    spec, faults = replay.cell["lift"], []
+    pair = replay.pair("part", "bin bottom")
+    start = replay.tcp(lift[0])
+    for q in dense(lift, step_m):
+        way_m = float(np.linalg.norm(replay.tcp(q) - start))
+        distance_m = replay.distances(q, [pair])[0]
+        least = 0.0 if way_m > spec["contact_distance_m"] + 1e-6 else (
+            -spec["contact_allowance_m"] - 1e-5)  # fmt: skip
+        if distance_m < least:
+            faults.append(f"{1e3 * distance_m:.2f} mm from the bottom at {way_m:.4f} m")
+            break
+    return faults
