@@ -6,8 +6,6 @@ points down into a narrow bin that no link can touch; only the part can.
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -37,7 +35,7 @@ TOY = (
 )
 
 
-def scan(folder: Path, *overrides: str, **options) -> object:
+def scan(folder, *overrides, **options):
     """Scan the toy and read its map."""
     path = folder / "toy.h5"
     bin_scan(
@@ -84,7 +82,7 @@ def reached(record) -> np.ndarray:
     return np.argwhere(record.status == Status.PATH_FOUND)
 
 
-def test_walls_take_the_outermost_grasps(toy) -> None:
+def test_walls_take_the_outermost_grasps(toy):
     """A part 20 mm wide keeps 2 mm from walls 200 mm apart: |x| up to 88 mm."""
     found = toy.status == Status.PATH_FOUND
     fits = np.abs(toy.x) + HALF + MARGIN < 0.1
@@ -98,7 +96,7 @@ def test_walls_take_the_outermost_grasps(toy) -> None:
     assert toy.cycle.reachability.ravel().tolist() == [100.0 * f for f in fits]
 
 
-def test_lifts_are_as_high_as_the_rim_asks(toy) -> None:
+def test_lifts_are_as_high_as_the_rim_asks(toy):
     """The part's lower end rises straight from 10 mm to 10 mm above the rim."""
     whole = np.argwhere(toy.cycle.drop_off >= 0)
     for grasp in whole:
@@ -109,7 +107,7 @@ def test_lifts_are_as_high_as_the_rim_asks(toy) -> None:
         np.testing.assert_allclose(points[:, 0], points[0, 0], atol=1e-4)
 
 
-def test_every_time_is_the_closed_form(toy) -> None:
+def test_every_time_is_the_closed_form(toy):
     """The transfer and the return are straight, and the cycle is the sum of all."""
     place = np.radians([*PLACE_DEG.values()])
     scan_q = toy.scan_configuration
@@ -127,7 +125,7 @@ def test_every_time_is_the_closed_form(toy) -> None:
         np.testing.assert_allclose(toy.cycle.length[tuple(grasp)], lengths)
 
 
-def test_waits_are_added_and_pictures_overlap(tmp_path, toy) -> None:
+def test_waits_are_added_and_pictures_overlap(tmp_path, toy):
     """A picture while the part is put down costs what the way back leaves of it."""
     waits = "cycle={image_s: 2.5, grasp_s: 0.3, release_s: 0.2, io_s: 0.1}"
     plain = scan(tmp_path, waits)
@@ -143,7 +141,7 @@ def test_waits_are_added_and_pictures_overlap(tmp_path, toy) -> None:
     )
 
 
-def test_the_arm_returns_by_way_of_home(tmp_path) -> None:
+def test_the_arm_returns_by_way_of_home(tmp_path):
     """The way back passes through the configuration that the cell names."""
     home = {"joint_1": 100.0, "joint_2": 20.0, "joint_3": 10.0}
     record = scan(tmp_path, f"cycle.return_to={{q_deg: {home}}}".replace("'", ""))
@@ -156,17 +154,18 @@ def test_the_arm_returns_by_way_of_home(tmp_path) -> None:
 
 
 @pytest.mark.slow
-def test_nothing_collides_in_an_independent_replay(toy) -> None:
+def test_nothing_collides_in_an_independent_replay(toy):
     """The outermost stored cycles, at a third of the verification distance."""
     loaded = loaded_from(toy)
     for grasp in np.argwhere(toy.cycle.drop_off >= 0)[[0, -1]]:
         assert faults_of_cycle(loaded, toy, grasp) == []
 
 
-def lifted(*overrides: str):
+def lifted(*overrides):
     """What becomes of a lift from the middle of the bin."""
     loaded = read_cell("planar-toy", (*TOY, *overrides))
     scenes = CycleScenes.of(loaded)
+    assert scenes is not None
     T = np.linalg.inv(loaded.cell.robot.base_pose.matrix())
     height = loaded.cell.bin_scan.layers[0]
     target = T @ np.array([0.35, -0.16, 0.05 + height, 1.0])
@@ -178,7 +177,7 @@ def lifted(*overrides: str):
 
 
 @pytest.mark.parametrize("allowance_mm", [0.0, 1.0, 2.0, 3.5])
-def test_the_part_may_start_in_the_bottom_by_its_allowance(allowance_mm) -> None:
+def test_the_part_may_start_in_the_bottom_by_its_allowance(allowance_mm):
     """Allowed to a hundredth of a millimetre, and refused by as much more."""
     allow = f"lift.contact_allowance_m={allowance_mm / 1e3}"
     for more_mm, status in ((-0.01, StageStatus.PATH_FOUND),
@@ -194,7 +193,7 @@ def test_the_part_may_start_in_the_bottom_by_its_allowance(allowance_mm) -> None
 
 
 @pytest.mark.parametrize(("distance_mm", "leaves"), [(3.9, False), (4.1, True)])
-def test_contact_ends_in_the_first_millimetres(distance_mm, leaves) -> None:
+def test_contact_ends_in_the_first_millimetres(distance_mm, leaves):
     """2 mm inside, the part is 2 mm clear of the bottom after 4 mm of its lift."""
     found = lifted(
         "lift.contact_allowance_m=0.002",
@@ -205,7 +204,7 @@ def test_contact_ends_in_the_first_millimetres(distance_mm, leaves) -> None:
     assert leaves or found.status == StageStatus.LIFT_BLOCKED
 
 
-def test_neighbours_are_passed_upwards_only() -> None:
+def test_neighbours_are_passed_upwards_only():
     """A part among others leaves straight up, not along a tool that leans."""
     heap = ("bin.heap=0.035", "bin_scan.layers=[0.04]")
     assert lifted(*heap).status == StageStatus.PATH_FOUND
@@ -218,7 +217,7 @@ def test_neighbours_are_passed_upwards_only() -> None:
     )
 
 
-def test_lifts_of_a_given_length(tmp_path) -> None:
+def test_lifts_of_a_given_length(tmp_path):
     """Metres in the cell are metres of the TCP."""
     record = scan(tmp_path, "lift.height=0.123", "bin_scan.grid=[3, 1]")
     lift = paths_by_stage(record, np.argwhere(record.cycle.drop_off >= 0)[0])[1]
@@ -235,14 +234,14 @@ def test_lifts_of_a_given_length(tmp_path) -> None:
          "cycle.return_to: link_1 touches post"),
     ],
 )  # fmt: skip
-def test_parts_that_cannot_be_there_are_refused(tmp_path, overrides, message) -> None:
+def test_parts_that_cannot_be_there_are_refused(tmp_path, overrides, message):
     """In a sentence, before any work, with nothing written."""
     with pytest.raises(SceneError, match=message):
         scan(tmp_path, *overrides)
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_place_out_of_reach_is_a_result(tmp_path) -> None:
+def test_a_place_out_of_reach_is_a_result(tmp_path):
     """Grasps and lifts stay; the stage that fails has the status."""
     far = "drop_off={pose: {xyz: [5, 0, 0]}}"
     record = scan(tmp_path, far, "bin_scan.grid=[3, 1]")
@@ -253,14 +252,14 @@ def test_a_place_out_of_reach_is_a_result(tmp_path) -> None:
     assert np.nanmax(record.path_reachability) == 100
 
 
-def test_the_lift_alone_where_the_part_goes_nowhere(tmp_path) -> None:
+def test_the_lift_alone_where_the_part_goes_nowhere(tmp_path):
     """Without a drop-off the map has the lift as its only stage."""
     record = scan(tmp_path, "drop_off=null", "bin_scan.grid=[3, 1]")
     assert record.cycle.stages == ("lift",)
     assert np.nanmax(record.cycle.reachability) == 100
 
 
-def test_the_nearer_of_two_places_is_taken(tmp_path) -> None:
+def test_the_nearer_of_two_places_is_taken(tmp_path):
     """Each grasp goes where its cycle is shortest; both tried alone are no quicker."""
     far = {"joint_1": -90.0, "joint_2": 0.0, "joint_3": 0.0}
     near = PLACE_DEG
@@ -279,7 +278,7 @@ def test_the_nearer_of_two_places_is_taken(tmp_path) -> None:
     )
 
 
-def test_the_map_does_not_depend_on_the_workers(tmp_path, toy) -> None:
+def test_the_map_does_not_depend_on_the_workers(tmp_path, toy):
     """Two workers make the same contents."""
     again = scan(tmp_path, workers=2)
     assert again.stamp.content_sha256 == toy.stamp.content_sha256

@@ -36,7 +36,7 @@ def pose_of(spec: dict[str, Any]) -> Any:
     return T
 
 
-def numbers(element: ET.Element | None, name: str) -> Any:
+def numbers(element: Any, name: str) -> Any:
     """Numbers of an attribute, zeros where it is missing."""
     text = None if element is None else element.get(name)
     return np.array([float(v) for v in (text or "0 0 0").split()])
@@ -56,10 +56,10 @@ def primitive(shape: dict[str, Any]) -> Any:
 
 def surface(path: Any, scale: Any) -> Any:
     """Coal's triangles of a mesh file."""
-    mesh = trimesh.load(path, force="mesh")
+    mesh: Any = trimesh.load(path, force="mesh")
     body = coal.BVHModelOBBRSS()
     body.beginModel(len(mesh.faces), len(mesh.vertices))
-    body.addVertices(np.ascontiguousarray(mesh.vertices * scale, float))
+    body.addVertices(np.ascontiguousarray(mesh.vertices * scale))
     body.addTriangles(np.ascontiguousarray(mesh.faces, np.int64))
     body.endModel()
     return body
@@ -71,8 +71,10 @@ class Replay:
     def __init__(self, loaded: Any, joint_names: Any) -> None:
         self.cell = json.loads(loaded.resolved_json)
         self.joint_names = list(joint_names)
-        root = ET.fromstring(loaded.urdf)
-        self.joints = {j.find("child").get("link"): j for j in root.findall("joint")}
+        root: Any = ET.fromstring(loaded.urdf)
+        self.joints: Any = {
+            j.find("child").get("link"): j for j in root.findall("joint")
+        }
         self.names: list[str] = []
         self.shapes: list[Any] = []
         self.links: list[str] = []
@@ -96,7 +98,7 @@ class Replay:
         ]
         self._allow(loaded, root)
 
-    def _add_link(self, loaded: Any, name: str, item: ET.Element) -> None:
+    def _add_link(self, loaded: Any, name: str, item: Any) -> None:
         origin, geometry = item.find("origin"), item.find("geometry")[0]
         T = pose(numbers(origin, "xyz"), numbers(origin, "rpy"))
         if geometry.tag == "mesh":
@@ -155,7 +157,7 @@ class Replay:
     def _ok(self, a: int, b: int) -> bool:
         return self._rigid(self.links[a]) != self._rigid(self.links[b])
 
-    def _allow(self, loaded: Any, root: ET.Element) -> None:
+    def _allow(self, loaded: Any, root: Any) -> None:
         allowed = {
             frozenset((j.find("parent").get("link"), j.find("child").get("link")))
             for j in root.findall("joint")
@@ -189,7 +191,7 @@ class Replay:
                     known[link] = of(joint.find("parent").get("link")) @ motion(joint)
             return known[link]
 
-        def motion(joint: ET.Element) -> Any:
+        def motion(joint: Any) -> Any:
             origin, name = joint.find("origin"), joint.get("name")
             T = pose(numbers(origin, "xyz"), numbers(origin, "rpy"))
             value = values.get(name, np.radians(locked.get(name, 0.0)))
@@ -272,7 +274,7 @@ def paths_by_stage(record: Any, grasp: Any) -> dict[int, Any]:
     return found
 
 
-def faults_of_cycle(loaded: Any, record: Any, grasp: Any, share: float = 1 / 3) -> list:
+def faults_of_cycle(loaded: Any, record: Any, grasp: Any, share: float = 1 / 3) -> Any:
     """Everything wrong with one stored cycle, in words."""
     replay = Replay(loaded, record.joint_names)
     cell, faults = replay.cell, []
