@@ -137,7 +137,7 @@ def test_the_page_has_nothing_that_no_file_has() -> None:
     known |= {f"provenance/{name}" for name in PROVENANCE_TEXTS}
     known |= {f"run/{name}" for name in RUN_TEXTS}
     known |= {"support", "workspace.h5", "placement.h5", "bin.h5", "study.h5"}
-    known |= {"robustness.h5"}
+    known |= {"robustness.h5", "robot.h5"}
     assert set(rows()) == known
 
 
