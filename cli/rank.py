@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from reachmap.cli import options
-from reachmap.cli.options import list_options
+from reachmap.cli.list_options import list_options
 
 if TYPE_CHECKING:
     from reachmap.ranking.lookup.settings import CostBasis, RankSettings
@@ -132,6 +132,7 @@ def command(
       reachmap rank grasps.json -o ranked.json --chart ranking.png
       network | reachmap rank - --top 10 | robot
       reachmap rank grasps.json --explain NW-12
+      reachmap rank grasps.json --cost cycle -o ranked.json
     """
     _check_options(cell, output, chart, explain)
     from reachmap.cli.text.rank import ranking_tables

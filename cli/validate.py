@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from reachmap.cli import options
-from reachmap.cli.options import list_options
+from reachmap.cli.list_options import list_options
 from reachmap.runtime.options import RunOptions
 
 if TYPE_CHECKING:

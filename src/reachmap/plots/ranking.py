@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import cycle
 from typing import Final
 
 import numpy as np
@@ -34,7 +35,18 @@ TERM_COLOURS: Final[Mapping[str, str]] = {
     "joint_margin": "#8c6d4f",
     "singularity": "#5fb0c9",
     "wind_up": "#a8a13b",
+    "to_grasp_s": "#2f6db3",
+    "lift_s": "#56a36c",
+    "transfer_s": "#8cc152",
+    "place_s": "#c8b13b",
+    "retreat_s": "#7fb8d6",
+    "return_s": "#4f81bd",
+    "waits_s": "#b0b0b0",
+    "planning_s": "#e69f00",
+    "failure_s": "#c44e52",
 }
+OTHER_COLOURS: Final = ("#9467bd", "#8c6d4f", "#5fb0c9", "#a8a13b")
+"""Of stages that go by other names."""
 MAX_GROUPS: Final = 24
 BAR_WIDTH: Final = 0.38
 PLACES: Final = (-0.21, 0.21)
@@ -90,7 +102,7 @@ def ranking_chart(
     with drawing():
         width = max(6.4, 1.6 + 1.45 * len(groups))
         figure = new_figure(width, 5.0)
-        put_title(figure, 0.75, _title(groups, top), subtitle)
+        put_title(figure, 0.75, _title(groups, names, top), subtitle)
         axes = axes_at(figure, 0.75, 0.95, width - 0.95, 3.15)
         limit = 1.22 * max(_tallest(groups, top), 1e-3)
         for place, group in enumerate(groups):
@@ -98,14 +110,17 @@ def ranking_chart(
                 PLACES, (group.supplied, group.ranked), strict=True
             ):
                 _draw_bar(axes, place + shift, terms[:top], names, limit)
-        _finish(axes, groups, top, limit)
+        unit = "mean seconds per pick" if in_seconds(names) else "mean J"
+        _finish(axes, groups, unit, top, limit)
         _legend(figure, groups, names, top)
     return figure
 
 
-def _title(groups: Sequence[CostGroup], top: int) -> str:
+def _title(groups: Sequence[CostGroup], names: Sequence[str], top: int) -> str:
     most = max(len(group.supplied) for group in groups)
-    return f"Mean cost of the first {min(top, most)} grasps, as supplied and re-ranked"
+    what = "time per pick" if in_seconds(names) else "cost"
+    first = f"the first {min(top, most)} grasps"
+    return f"Mean {what} of {first}, as supplied and re-ranked"
 
 
 def _tallest(groups: Sequence[CostGroup], top: int) -> float:
@@ -125,7 +140,17 @@ def _means(terms: FloatArray) -> FloatArray:
 
 def term_label(name: str) -> str:
     """A term in words."""
-    return name.replace("_", " ")
+    return name.removesuffix("_s").replace("_", " ")
+
+
+def in_seconds(names: Sequence[str]) -> bool:
+    """Whether terms are predicted seconds, not summands of J."""
+    return all(name.endswith("_s") for name in names)
+
+
+def _colours(names: Sequence[str]) -> list[str]:
+    others = cycle(OTHER_COLOURS)
+    return [TERM_COLOURS.get(name) or next(others) for name in names]
 
 
 def _draw_bar(
@@ -139,8 +164,7 @@ def _draw_bar(
             x, limit * 0.985, text, ha="center", va="top", fontsize=6.6, color=INK
         )
     bottom = 0.0
-    for value, name in zip(_means(terms), names, strict=True):
-        colour = TERM_COLOURS[name]
+    for value, colour in zip(_means(terms), _colours(names), strict=True):
         axes.bar(x, value, BAR_WIDTH, bottom=bottom, color=colour, zorder=2)
         bottom += float(value)
     if unreachable < len(terms):
@@ -153,10 +177,12 @@ def _draw_bar(
         )  # fmt: skip
 
 
-def _finish(axes: Axes, groups: Sequence[CostGroup], top: int, limit: float) -> None:
+def _finish(
+    axes: Axes, groups: Sequence[CostGroup], unit: str, top: int, limit: float
+) -> None:
     axes.set_ylim(0.0, limit)
     axes.set_xlim(-0.6, len(groups) - 0.4)
-    axes.set_ylabel("mean J")
+    axes.set_ylabel(unit)
     places = [place + shift for place in range(len(groups)) for shift in PLACES]
     axes.set_xticks(places, ["supplied", "re-ranked"] * len(groups), fontsize=6.8)
     axes.tick_params(axis="x", length=0)
@@ -177,14 +203,17 @@ def _legend(
     figure: Figure, groups: Sequence[CostGroup], names: Sequence[str], top: int
 ) -> None:
     left = 0.75 / float(figure.get_size_inches()[0])
-    handles = [Patch(color=TERM_COLOURS[k], label=term_label(k)) for k in names]
+    handles = [
+        Patch(color=colour, label=term_label(name))
+        for colour, name in zip(_colours(names), names, strict=True)
+    ]
     orders = [terms[:top] for g in groups for terms in (g.supplied, g.ranked)]
     if any(np.isnan(terms).any() for terms in orders):
         handles.append(
             Patch(color=NOT_ATTEMPTED, label="unreachable grasps: the mean is infinite")
         )
     figure.legend(
-        handles=handles, loc="lower left", ncols=len(handles), labelcolor=MUTED,
+        handles=handles, loc="lower left", ncols=min(len(handles), 6), labelcolor=MUTED,
         bbox_to_anchor=(left, 0.01), borderaxespad=0.0, columnspacing=1.2,
         handlelength=1.1, fontsize=7.4,
     )  # fmt: skip

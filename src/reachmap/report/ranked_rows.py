@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
 from reachmap.ranking.answers.ranked_list import TERM_NAMES
+
+SECONDS: Final = re.compile(r"[a-z][a-z_]{0,40}_s")
+"""Names of terms in predicted seconds: stages are what a map calls them."""
+MOST_TERMS: Final = 16
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -21,9 +26,9 @@ class RankedRow:
     quadrant : str
     rank, original_rank : int or None
     cost : float or None
-        J; None where it is not reached.
+        J, or seconds per pick; None where it is not reached.
     terms : mapping
-        Summands of J by name.
+        Summands of the cost by name.
     status : str
     """
 
@@ -68,7 +73,11 @@ def _row(grasp: Mapping[str, Any], result: Mapping[str, Any]) -> RankedRow:
     before = _whole(result.get("original_rank"))
     terms = result.get("terms")
     named = terms if isinstance(terms, dict) else {}
-    known = {name: known_number(named.get(name)) for name in TERM_NAMES}
+    known = {
+        name: known_number(value)
+        for name, value in list(named.items())[:MOST_TERMS]
+        if name in TERM_NAMES or SECONDS.fullmatch(name)
+    }
     return RankedRow(
         name=str(grasp.get("id") or f"no. {before or '?'}"),
         quadrant=str(grasp.get("quadrant") or ""),

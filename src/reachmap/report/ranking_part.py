@@ -12,6 +12,7 @@ from reachmap.maps.format.registry import Artefact
 from reachmap.plots.ranking import MAX_GROUPS, CostGroup, ranking_chart, term_label
 from reachmap.ranking.answers.ranked_list import QUADRANT_ORDER, TERM_NAMES
 from reachmap.ranking.lookup.table import TERMS
+from reachmap.ranking.terms.seconds import FAILURE, PLANNING, TO_GRASP
 from reachmap.report.blocks import (
     Blocks,
     Heading,
@@ -23,7 +24,12 @@ from reachmap.report.blocks import (
     table,
 )
 from reachmap.report.numbers import NONE, count, number
-from reachmap.report.ranked_rows import RankedRow, ranked_rows, weights_of
+from reachmap.report.ranked_rows import (
+    RankedRow,
+    known_number,
+    ranked_rows,
+    weights_of,
+)
 
 TOP = 10
 
@@ -41,39 +47,71 @@ def ranking_section(
         Whose hash the chart keeps.
     """
     parts: list[Blocks] = []
-    groups: list[CostGroup] = []
-    names = _terms_of(documents)
+    groups: dict[str, list[CostGroup]] = {"paper": [], "cycle": []}
+    names = {cost: _terms_of(documents, cost) for cost in groups}
     for index, document in enumerate(documents):
         name = f"List {index + 1}" if len(documents) > 1 else ""
         if name:
             parts.append(Heading(name))
-        parts += [paragraph(_words(document)), _table(document)]
-        groups += _groups(document, name, names)
-    if groups:
-        parts.append(
-            drawn(
-                ranking_chart(groups[:MAX_GROUPS], names, TOP),
-                "Mean cost of the first grasps, as supplied and re-ranked; the map is "
-                "all that was asked.",
-                record,
+        cost = _cost_of(document)
+        said = _seconds_words if cost == "cycle" else _words
+        parts += [paragraph(said(document)), _table(document)]
+        groups[cost] += _groups(document, name, names[cost])
+    for cost, own in groups.items():
+        if own:
+            what = "time per pick" if cost == "cycle" else "cost"
+            parts.append(
+                drawn(
+                    ranking_chart(own[:MAX_GROUPS], names[cost], TOP),
+                    f"Mean {what} of the first grasps, as supplied and re-ranked; the "
+                    "map is all that was asked.",
+                    record,
+                )
             )
-        )
     return section("ranking", "Which grasps come first", parts)
 
 
+def _cost_of(document: Mapping[str, Any]) -> str:
+    return "cycle" if document["reachmap"].get("cost") == "cycle" else "paper"
+
+
 def _words(document: Mapping[str, Any]) -> str:
-    rows = ranked_rows(document)
-    reached = sum(row.cost is not None for row in rows)
     weights = ", ".join(number(weight, 2) for weight in weights_of(document))
     return (
-        f"{count(len(rows), 'grasp')}, {reached} of them reached. "
+        f"{_counted(document)} "
         "J is the weighted sum of path length, planning time and execution time "
         "of the nearest test grasp, each as a share of its maximum "
         f"(weights {weights or NONE})."
     )
 
 
+def _seconds_words(document: Mapping[str, Any]) -> str:
+    own = document["reachmap"]
+    failure_s = number(known_number(own.get("failure_cost_s")), 1)
+    made = own.get("picks_per_hour")
+    rate = made if isinstance(made, dict) else {}
+    each, low, high = (
+        number(known_number(rate.get(key)), 0)
+        for key in ("picks_per_hour", "low", "high")
+    )
+    return (
+        f"{_counted(document)} The cost is the predicted time of a pick: the cycle of "
+        "the nearest test grasp, the planning effort, and what a failure costs "
+        f"({failure_s} s) times its probability. The list makes {each} picks per hour "
+        f"(95 % interval {low} to {high})."
+    )
+
+
+def _counted(document: Mapping[str, Any]) -> str:
+    rows = ranked_rows(document)
+    reached = sum(row.cost is not None for row in rows)
+    return f"{count(len(rows), 'grasp')}, {reached} of them reached."
+
+
 def _table(document: Mapping[str, Any]) -> Table:
+    names, unit = TERMS, "J"
+    if _cost_of(document) == "cycle":
+        names, unit = (TO_GRASP, PLANNING, FAILURE), "seconds"
     rows = [
         (
             NONE if row.rank is None else row.rank,
@@ -81,18 +119,21 @@ def _table(document: Mapping[str, Any]) -> Table:
             row.name,
             row.quadrant,
             number(row.cost, 3),
-            *(number(row.terms.get(name), 3) for name in TERMS),
+            *(number(row.terms.get(name), 3) for name in names),
             row.status,
         )
         for row in ranked_rows(document)[:TOP]
     ]
-    head = ("rank", "was", "grasp", "quadrant", "J", *map(term_label, TERMS), "state")
+    head = ("rank", "was", "grasp", "quadrant", unit, *map(term_label, names), "state")
     return table(head, rows, ">><<>>>><")
 
 
-def _terms_of(documents: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Terms of the cost that any of the lists was ranked by."""
-    known = {name for d in documents for row in ranked_rows(d) for name in row.terms}
+def _terms_of(documents: Sequence[Mapping[str, Any]], cost: str) -> list[str]:
+    """Terms that any of the lists with this cost was ranked by."""
+    own = [document for document in documents if _cost_of(document) == cost]
+    known = dict.fromkeys(k for d in own for row in ranked_rows(d) for k in row.terms)
+    if cost == "cycle":
+        return [name for name in known if name not in TERM_NAMES]
     return [name for name in TERM_NAMES if name in known or name in TERMS]
 
 

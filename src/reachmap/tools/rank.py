@@ -291,5 +291,8 @@ def _draw(
 
 def _subtitle(ranked: Sequence[RankedList]) -> str:
     names = ", ".join(Path(one.grasps.source).name for one in ranked)
+    if ranked[0].in_seconds:
+        failure_s = ranked[0].header["failure_cost_s"]
+        return f"{names} · a failed pick costs {failure_s:.1f} s"
     alpha, beta, delta = ranked[0].asked.weights
     return f"{names} · J with α = {alpha:g}, β = {beta:g}, δ = {delta:g}"

@@ -75,7 +75,7 @@ def explanation(ranked: RankedList, row: int, ranker: Ranker, bin_map: BinMap) -
     else:
         parts += [
             ("attempts", _attempts_line(ranked, row, ranker, bin_map)),
-            ("cost", _cost_line(ranked, row)),
+            ("cost", _cost_line(ranked, row, bin_map)),
             ("probability", _probability_line(ranked, row)),
             *(("tie", line) for line in _tie_lines(ranked, row, ranker, bin_map)),
         ]
@@ -156,16 +156,29 @@ def _cause(at: tuple[int, ...], bin_map: BinMap) -> str:
     return said
 
 
-def _cost_line(ranked: RankedList, row: int) -> str:
+def _stage_pair(at: tuple[int, ...], bin_map: BinMap) -> str:
+    """Bodies in the way of a later stage of the cycle, if any are known."""
+    pairs = [] if bin_map.cycle is None else bin_map.cycle.blocking_pair[at].tolist()
+    known = [bin_map.body_pairs[pair] for pair in pairs if pair >= 0]
+    return f" ({known[0]})" if known else ""
+
+
+def _cost_line(ranked: RankedList, row: int, bin_map: BinMap) -> str:
     ranking = ranked.ranking
     if not ranking.reachable[row]:
-        return f"none: {status_name(ranking.status[row])}"
+        at = tuple(ranking.test_grasp[row].tolist())
+        return f"none: {status_name(ranking.status[row])}{_stage_pair(at, bin_map)}"
     parts = " + ".join(
-        f"{values[row]:.3f} {name.replace('_', ' ')}"
+        f"{values[row]:.3f} {name.removesuffix('_s').replace('_', ' ')}"
         for name, values in ranked.terms().items()
     )
     tool = _vector(ranking.orientation_wxyz[row], 4)
-    return f"J = {ranking.cost[row]:.3f} = {parts}; tool orientation wxyz {tool}"
+    total = f"{_unit(ranked)}{ranking.cost[row]:.3f}"
+    return f"{total} = {parts}; tool orientation wxyz {tool}"
+
+
+def _unit(ranked: RankedList) -> str:
+    return "seconds per pick: " if ranked.in_seconds else "J = "
 
 
 def _probability_line(ranked: RankedList, row: int) -> str:
@@ -186,7 +199,9 @@ def _tie_lines(
     for p, o in zip(point.tolist(), orientation.tolist(), strict=True):
         at = (*(int(i) for i in np.unravel_index(p, ranker.table.shape[:3])), o)
         cost = costs[p, o]
-        said = f"J = {cost:.3f}" if np.isfinite(cost) else _cause(at, bin_map)
+        said = (
+            f"{_unit(ranked)}{cost:.3f}" if np.isfinite(cost) else _cause(at, bin_map)
+        )
         chosen = at == tuple(ranked.ranking.test_grasp[row].tolist())
         mark = "taken" if chosen else "as near"
         lines.append(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -11,15 +12,18 @@ from reachmap import __version__
 from reachmap._typing import FloatArray
 from reachmap.errors import SettingsError
 from reachmap.geometry import rotation_from_quaternion_wxyz, transform_from_parts
+from reachmap.maps.bytes.to_json import json_ready
 from reachmap.ranking.answers.doubts import list_doubts
 from reachmap.ranking.answers.ranked_list import RankedList
 from reachmap.ranking.lists.arrays import GraspList
 from reachmap.ranking.lookup.frames import place_grasps
 from reachmap.ranking.lookup.matching import Queries
+from reachmap.ranking.lookup.order import Ranking
 from reachmap.ranking.lookup.queries import queries_from_arrays
 from reachmap.ranking.lookup.ranker import Ranker
 from reachmap.ranking.lookup.settings import RankSettings
 from reachmap.ranking.lookup.table import TERMS
+from reachmap.ranking.terms.seconds import throughput_of
 
 
 def rank_list(
@@ -65,7 +69,7 @@ def rank_list(
         queries=queries,
         ranking=ranking,
         asked=settings,
-        header=_header(ranker, settings),
+        header=_header(ranker, settings, ranking),
         doubts=list_doubts(
             grasps,
             ranking,
@@ -74,7 +78,23 @@ def rank_list(
     )
 
 
-def _header(ranker: Ranker, settings: RankSettings) -> Mapping[str, Any]:
+def _cost_facts(
+    ranker: Ranker, settings: RankSettings, ranking: Ranking
+) -> Mapping[str, Any]:
+    """What the cost is; for seconds also what a failure costs and picks per hour."""
+    if settings.cost == "paper":
+        return {"cost": "paper"}
+    made = throughput_of(ranking.cost)
+    return {
+        "cost": "cycle",
+        "failure_cost_s": ranker.failure_cost_s(settings),
+        "picks_per_hour": None if made is None else json_ready(asdict(made)),
+    }
+
+
+def _header(
+    ranker: Ranker, settings: RankSettings, ranking: Ranking
+) -> Mapping[str, Any]:
     table = ranker.table
     maxima = dict(zip(TERMS, table.maxima.tolist(), strict=True))
     scale = dict(zip(TERMS, table.scale.tolist(), strict=True))
@@ -84,6 +104,7 @@ def _header(ranker: Ranker, settings: RankSettings) -> Mapping[str, Any]:
         "cost_table_sha256": ranker.cost_table_sha256,
         "cell_sha256": ranker.stamp.cell_sha256,
         "calibration": _calibration_facts(ranker),
+        **_cost_facts(ranker, settings, ranking),
         "weights": list(settings.weights),
         "likeness": settings.likeness,
         **({"margins": dict(settings.margins)} if settings.margins else {}),

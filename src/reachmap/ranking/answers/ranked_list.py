@@ -12,11 +12,11 @@ import numpy as np
 
 from reachmap._typing import FloatArray
 from reachmap.ranking.lists.arrays import GraspList
-from reachmap.ranking.lookup.columns import LIKENESS
 from reachmap.ranking.lookup.matching import Queries
 from reachmap.ranking.lookup.order import INVALID, OUTSIDE_MAP, Ranking, status_name
 from reachmap.ranking.lookup.settings import MARGINS, RankSettings
 from reachmap.ranking.lookup.table import TERMS
+from reachmap.ranking.terms.columns import LIKENESS
 
 TERM_NAMES = (*TERMS, LIKENESS, *MARGINS)
 
@@ -55,6 +55,11 @@ class RankedList:
             for name, values in named
             if name != LIKENESS or self.asked.likeness
         }
+
+    @property
+    def in_seconds(self) -> bool:
+        """Whether the cost is in predicted seconds per pick."""
+        return self.asked.cost == "cycle"
 
     def counts(self) -> dict[str, int]:
         """How many grasps ended in which status, most frequent first."""
@@ -137,7 +142,10 @@ def _results(ranked: RankedList) -> list[dict[str, Any]]:
         strict=True,
     )
     names = tuple(named)
-    return [_result(row, names, values) for row, values in enumerate(columns, start=1)]
+    results = [_result(row, names, row_of) for row, row_of in enumerate(columns, 1)]
+    if ranked.in_seconds:
+        results = [{**result, "seconds": result["cost"]} for result in results]
+    return results
 
 
 def _result(

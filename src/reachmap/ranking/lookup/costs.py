@@ -12,7 +12,6 @@ from typing import Final
 import numpy as np
 
 from reachmap._typing import BoolArray, FloatArray, IntArray
-from reachmap.ranking.lookup.columns import Columns
 from reachmap.ranking.lookup.matching import (
     TIED_POINTS,
     Matches,
@@ -23,6 +22,7 @@ from reachmap.ranking.lookup.matching import (
 )
 from reachmap.ranking.lookup.settings import ALIKE_STEPS
 from reachmap.ranking.lookup.table import GraspTable
+from reachmap.ranking.terms.columns import Columns
 
 # Beyond half a grid diagonal sideways, and so far above or below the layers: grasp
 # points of a heap lie centimetres above and below the height that stands for them.

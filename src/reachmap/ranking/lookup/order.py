@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from reachmap._typing import BoolArray, CodeArray, FloatArray, IntArray
-from reachmap.maps.records import Status, freeze
+from reachmap.maps.parts import StageStatus, freeze
 
 OUTSIDE_MAP: Final = 254
 UNLIKE_MAP: Final = 253
@@ -32,15 +32,16 @@ class Ranking:
         Supplied numbers of the grasps, best first; unreachable ones last in their
         supplied order.
     cost : array, shape (n,)
-        J; inf where unreachable.
+        J, or predicted seconds per pick; inf where unreachable.
     terms : array, shape (n, k)
         α φ3, β φ4, δ φ5, ε φ6 and the margins that were asked for, each with its
-        weight, which add up to J; NaN where unreachable.
+        weight, or seconds by stage; they add up to the cost. NaN where unreachable.
     term_names : tuple of str, length k
     status : uint8 array, shape (n,)
         :class:`reachmap.maps.records.Status` of the test grasp, or ``OUTSIDE_MAP``
         (too far from the test points), ``UNLIKE_MAP`` (no orientation is near enough)
-        or ``INVALID`` (not finite, no direction, no rotation).
+        or ``INVALID`` (not finite, no direction, no rotation). Where the cost is of
+        cycles, :class:`reachmap.maps.parts.StageStatus` of the stage that fails.
     test_grasp : int array, shape (n, 4)
         Layer, y, x, orientation of the nearest test grasp; -1 where invalid.
     distance : array, shape (n,)
@@ -89,7 +90,7 @@ class Ranking:
 
 def status_name(code: int) -> str:
     """Name of a status code as files have it, ``path_found`` for one."""
-    return UNMATCHED.get(int(code)) or Status(int(code)).name.lower()
+    return UNMATCHED.get(int(code)) or StageStatus(int(code)).name.lower()
 
 
 def stable_order(cost: FloatArray, scores: ArrayLike | None = None) -> IntArray:

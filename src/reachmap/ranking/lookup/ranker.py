@@ -9,12 +9,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from reachmap._typing import FloatArray, IntArray
+from reachmap._typing import CodeArray, FloatArray, IntArray
 from reachmap.errors import MapFileError, SettingsError
 from reachmap.maps.format.bin import read_bin_map
 from reachmap.maps.records import BinMap, Stamp
 from reachmap.ranking.lookup.calibration import Calibration, usual_calibration
-from reachmap.ranking.lookup.columns import LIKENESS, Columns, columns_of
 from reachmap.ranking.lookup.costs import (
     beyond_points,
     blended_terms,
@@ -41,9 +40,18 @@ from reachmap.ranking.lookup.queries import (
     queries_from_arrays,
     rotations_from_quaternions,
 )
-from reachmap.ranking.lookup.settings import CostBasis, Invalid, RankSettings, Roll
+from reachmap.ranking.lookup.settings import (
+    EVEN,
+    Cost,
+    CostBasis,
+    Invalid,
+    RankSettings,
+    Roll,
+)
 from reachmap.ranking.lookup.surroundings import Surroundings
 from reachmap.ranking.lookup.table import GraspTable, table_from_bin_map
+from reachmap.ranking.terms.columns import LIKENESS, Columns, columns_of, cycle_of
+from reachmap.ranking.terms.seconds import FAILURE
 
 
 class Ranker:
@@ -120,7 +128,9 @@ class Ranker:
         *,
         quaternions_wxyz: ArrayLike | None = None,
         quaternions_xyzw: ArrayLike | None = None,
-        weights: Sequence[float] = (1.0, 1.0, 1.0),
+        cost: Cost = "paper",
+        failure_cost_s: float | None = None,
+        weights: Sequence[float] = EVEN,
         likeness: float = 0.0,
         margins: Mapping[str, float] | None = None,
         neighbours: int = 1,
@@ -141,6 +151,10 @@ class Ranker:
             TCP orientations. A row of NaN has none; its direction counts then.
         quaternions_wxyz, quaternions_xyzw : array_like, shape (n, 4), optional
             TCP orientations as quaternions, instead of ``rotations``.
+        cost : {"paper", "cycle"}
+            J, or predicted seconds per pick.
+        failure_cost_s : float, optional
+            What a failed pick costs where cost is cycle [s].
         weights : sequence of 3 float
             α, β, δ of path length, planning time and execution time.
         likeness : float
@@ -163,10 +177,12 @@ class Ranker:
         ------
         SettingsError
             Arrays that do not fit together; weights out of range; with
-            ``invalid="raise"`` also the rows that are no grasps; margins of a map that
-            has none.
+            ``invalid="raise"`` also the rows that are no grasps; margins or cycles of
+            a map that has none.
         """
         settings = RankSettings(
+            cost=cost,
+            failure_cost_s=failure_cost_s,
             weights=tuple(weights),  # type: ignore[arg-type]
             likeness=likeness,
             margins=dict(margins or {}),
@@ -200,12 +216,16 @@ class Ranker:
         matches = match(queries, table, self._tree, columns.costs())
         outside = outside_map(queries.points, matches.point, table)
         unlike = unlike_map(matches, queries.free, table, settings.max_angle_deg)
-        names, terms = self._terms(queries, matches, columns, settings)
+        probability = self._probability(queries)
+        if settings.cost == "cycle":
+            names, terms = self._seconds(matches, columns, settings, probability)
+        else:
+            names, terms = self._terms(queries, matches, columns, settings)
         matched = queries.valid & ~outside & ~unlike
         cost = np.where(matched, terms.sum(axis=1), np.inf)
         cost[np.isnan(cost)] = np.inf
         reachable = np.isfinite(cost)
-        status = table.status[matches.point, matches.orientation]
+        status = _status_of(table, settings)[matches.point, matches.orientation]
         status = np.where(unlike, np.uint8(UNLIKE_MAP), status)
         status = np.where(outside, np.uint8(OUTSIDE_MAP), status)
         status = np.where(queries.valid, status, np.uint8(INVALID))
@@ -221,7 +241,7 @@ class Ranker:
             angle=np.where(valid, matches.angle, np.nan),
             roll_free=queries.free.copy(),
             extrapolated=valid & ~outside & beyond_points(queries.points, table),
-            probability=np.where(matched, self._probability(queries), np.nan),
+            probability=np.where(matched, probability, np.nan),
             orientation_wxyz=table.recommended[matches.point, matches.orientation]
             + 0.0,
         )
@@ -264,6 +284,29 @@ class Ranker:
         unlike = settings.likeness * likeness_terms(matches, queries.free, table)
         terms = np.insert(phi * columns.weights, 3, unlike, axis=1)
         return (*columns.names[:3], LIKENESS, *columns.names[3:]), terms
+
+    def _seconds(
+        self,
+        matches: Matches,
+        columns: Columns,
+        settings: RankSettings,
+        probability: FloatArray,
+    ) -> tuple[tuple[str, ...], FloatArray]:
+        """Predicted seconds of each pick by stage, what a failure costs last."""
+        seconds = columns.values[matches.point, matches.orientation]
+        failing = self.failure_cost_s(settings) * (1.0 - probability)
+        return (*columns.names, FAILURE), np.column_stack([seconds, failing])
+
+    def failure_cost_s(self, settings: RankSettings) -> float:
+        """What a failed pick costs, the median cycle unless told [s]."""
+        if settings.failure_cost_s is not None:
+            return settings.failure_cost_s
+        return cycle_of(self.table).usual_failure_s()
+
+
+def _status_of(table: GraspTable, settings: RankSettings) -> CodeArray:
+    """State of each test grasp, of its whole cycle where that is asked for."""
+    return table.status if settings.cost == "paper" else cycle_of(table).status
 
 
 def _unravelled(matches: Matches, table: GraspTable) -> IntArray:

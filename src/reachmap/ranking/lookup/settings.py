@@ -23,7 +23,11 @@ ALIKE_STEPS: Final = 1.5
 Roll: TypeAlias = Literal["as-given", "free", "fixed"]
 ROLLS: Final[tuple[Roll, ...]] = ("as-given", "free", "fixed")
 MAX_WEIGHT: Final = 1e6
+EVEN: Final = (1.0, 1.0, 1.0)
 MAX_NEIGHBOURS: Final = 64
+Cost: TypeAlias = Literal["paper", "cycle"]
+COSTS: Final[tuple[Cost, ...]] = ("paper", "cycle")
+MAX_FAILURE_S: Final = 1e5
 MARGINS: Final = ("clearance", "joint_margin", "singularity", "wind_up")
 """Optional terms of J: what a path leaves, and how far it winds the wrist up."""
 
@@ -61,10 +65,16 @@ class CostBasis:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RankSettings:
-    """J = α φ3 + β φ4 + δ φ5 + ε φ6 + Σ μ_k φ_k, and how test grasps are matched.
+    """What grasps are ordered by, and how test grasps are matched.
 
     Attributes
     ----------
+    cost : {"paper", "cycle"}
+        paper: J = α φ3 + β φ4 + δ φ5 + ε φ6 + Σ μ_k φ_k; cycle: predicted seconds per
+        pick, which nothing is weighed in.
+    failure_cost_s : float or None
+        What a failed pick costs where cost is cycle [s]; None: the median cycle of
+        the map.
     weights : (float, float, float)
         α, β, δ of path length, planning time and execution time.
     likeness : float
@@ -83,7 +93,9 @@ class RankSettings:
         What becomes of rows that are not finite, have no direction or no rotation.
     """
 
-    weights: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    cost: Cost = "paper"
+    failure_cost_s: float | None = None
+    weights: tuple[float, float, float] = EVEN
     likeness: float = 0.0
     margins: Mapping[str, float] = field(default_factory=dict)
     neighbours: int = 1
@@ -113,9 +125,29 @@ class RankSettings:
             problems.append(f"max_angle_deg must be above 0, to 180 (got {limit:g})")
         if not any((*self.weights, self.likeness, *self.margins.values())):
             problems.append("one weight at least must be above 0")
+        problems += self._cost_problems()
         mistakes = [problem for problem in problems if problem]
         if mistakes:
             raise SettingsError(mistakes)
+
+    def _cost_problems(self) -> list[str]:
+        """What does not go with the cost that is asked for."""
+        failure_s = self.failure_cost_s
+        if self.cost not in COSTS:
+            return [f"cost must be one of {', '.join(COSTS)} (got {self.cost!r})"]
+        if self.cost == "paper":
+            return ["failure_cost_s needs cost cycle"] if failure_s is not None else []
+        problems = []
+        weighed = any((self.likeness, *self.margins.values()))
+        if weighed or self.weights != EVEN:
+            problems.append("cost cycle is in seconds: weights belong to cost paper")
+        if self.neighbours > 1:
+            problems.append("cost cycle is of the nearest test grasp: neighbours is 1")
+        if failure_s is not None and not 0 <= failure_s <= MAX_FAILURE_S:
+            problems.append(
+                f"failure_cost_s must be 0 to {MAX_FAILURE_S:g} (got {failure_s:g})"
+            )
+        return problems
 
 
 def _weight_problem(name: str, value: float) -> str:

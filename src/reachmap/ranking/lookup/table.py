@@ -18,8 +18,9 @@ from reachmap.geometry import (
 from reachmap.maps.bytes.hashing import canonical_array
 from reachmap.maps.records import BinMap, Status, freeze
 from reachmap.ranking.lookup.approach import axis_vector
-from reachmap.ranking.lookup.margins import margin_terms, margin_values
 from reachmap.ranking.lookup.settings import QUANTILE, CostBasis
+from reachmap.ranking.terms.margins import margin_terms, margin_values
+from reachmap.ranking.terms.seconds import CycleSeconds, cycle_seconds
 
 TERMS: Final = ("path_length", "planning_time", "execution_time")
 SAME_AXIS_RAD: Final = 1e-6
@@ -60,6 +61,8 @@ class GraspTable:
         φ3, φ4, φ5: means over scale; NaN where unreachable.
     margins : array, shape (n, m, 4), or None
         Terms in the order of ``MARGINS``, normalised; None for a map without them.
+    cycle : CycleSeconds or None
+        What whole picks take; None for a map without cycles.
     basis : CostBasis
         With the planning time that was used, whatever was asked for.
     same_everywhere : bool
@@ -90,6 +93,7 @@ class GraspTable:
     scale: FloatArray
     normalised: FloatArray
     margins: FloatArray | None
+    cycle: CycleSeconds | None
     basis: CostBasis
     same_everywhere: bool
     layers: FloatArray
@@ -113,6 +117,7 @@ class GraspTable:
             self.reachable,
             self.normalised,
             np.zeros(0) if self.margins is None else self.margins,
+            np.zeros(0) if self.cycle is None else self.cycle.values,
         ):
             digest.update(canonical_array(values).tobytes())
         return digest.hexdigest()
@@ -144,6 +149,7 @@ def table_from_bin_map(bin_map: BinMap, basis: CostBasis | None = None) -> Grasp
     reachable: BoolArray = np.isfinite(means[..., 0])
     maxima = np.max(means, axis=(0, 1), where=reachable[..., None], initial=0.0)
     scale = _scale(means[reachable], maxima, basis)
+    status = _status(bin_map.status.reshape(n, no), reachable)
     R = rotation_from_quaternion_wxyz(quaternions)
     axes = R @ axis_vector(bin_map.approach_axis)
     T_bin_base = inverse_transform(bin_map.bin_pose)
@@ -153,7 +159,7 @@ def table_from_bin_map(bin_map: BinMap, basis: CostBasis | None = None) -> Grasp
         quaternions=quaternions,
         recommended=_recommended(bin_map, quaternions),
         axes=axes,
-        status=_status(bin_map.status.reshape(n, no), reachable),
+        status=status,
         blocking_pair=bin_map.blocking_pair.reshape(n, no).copy(),
         reachable=reachable,
         means=means,
@@ -161,6 +167,7 @@ def table_from_bin_map(bin_map: BinMap, basis: CostBasis | None = None) -> Grasp
         scale=scale,
         normalised=means / scale,
         margins=_margins(bin_map, reachable, basis),
+        cycle=cycle_seconds(bin_map, status),
         basis=basis,
         same_everywhere=bool(
             (quaternion_angle(quaternions, quaternions[0]) < 1e-9).all()

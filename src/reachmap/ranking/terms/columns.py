@@ -10,6 +10,7 @@ from reachmap._typing import FloatArray
 from reachmap.errors import SettingsError
 from reachmap.ranking.lookup.settings import MARGINS, RankSettings
 from reachmap.ranking.lookup.table import TERMS, GraspTable
+from reachmap.ranking.terms.seconds import PLANNING, CycleSeconds
 
 LIKENESS = "likeness"
 
@@ -43,13 +44,15 @@ class Columns:
 
 
 def columns_of(table: GraspTable, settings: RankSettings) -> Columns:
-    """Arrange the terms of J that a question weighs.
+    """Arrange the terms that a question asks for.
 
     Raises
     ------
     SettingsError
-        Margins are asked for and the map has none.
+        Margins or seconds are asked for and the map has none.
     """
+    if settings.cost == "cycle":
+        return _seconds(table, cycle_of(table))
     columns = Columns(
         names=TERMS,
         weights=np.asarray(settings.weights, float),
@@ -73,4 +76,32 @@ def columns_of(table: GraspTable, settings: RankSettings) -> Columns:
             columns.worst,
             values.max(axis=(0, 1), where=table.reachable[..., None], initial=0.0),
         ),
+    )
+
+
+def cycle_of(table: GraspTable) -> CycleSeconds:
+    """Seconds of whole picks.
+
+    Raises
+    ------
+    SettingsError
+        The map has none.
+    """
+    if table.cycle is None:
+        raise SettingsError(
+            "cost cycle: the map has ways to the grasps only and no whole cycles; give "
+            "the cell part, lift and drop_off and scan the bin again, or rank by cost "
+            "paper"
+        )
+    return table.cycle
+
+
+def _seconds(table: GraspTable, cycle: CycleSeconds) -> Columns:
+    planning = np.where(cycle.whole, table.means[..., TERMS.index("planning_time")], 0)
+    values = np.concatenate([cycle.values, planning[..., None]], axis=-1)
+    return Columns(
+        names=(*cycle.names, PLANNING),
+        weights=np.ones(values.shape[-1]),
+        values=values,
+        worst=np.nan_to_num(values).max(axis=(0, 1)),
     )
