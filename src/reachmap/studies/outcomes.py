@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
@@ -18,8 +19,7 @@ from reachmap.maps.comparison.pose_matching import (
     frame_table,
 )
 from reachmap.maps.comparison.significance import (
-    mcnemar_exact,
-    paired_interval,
+    clustered_shares,
     paired_means,
 )
 from reachmap.maps.records import BinMap, Status, WorkspaceMap
@@ -44,6 +44,8 @@ class Outcomes:
         a point with a direction, a point.
     result : array, shape (n,)
         1 reached, 0 not; or a length, NaN where there is none.
+    place_columns : int
+        Columns of ``key`` that say where; what is at one place fails together.
     """
 
     value: float
@@ -51,6 +53,7 @@ class Outcomes:
     high: float
     key: FloatArray
     result: FloatArray
+    place_columns: int = 3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -81,7 +84,8 @@ def of_workspace(record: WorkspaceMap) -> dict[str, Outcomes]:
     rows = table.rows(np.flatnonzero(near))
     key = np.column_stack([rows.position[:, :2] / TOLERANCE_M, _turns(rows)])
     hit = rows.status == Status.PATH_FOUND
-    return {"level_average": _share(key, hit, value)}
+    share = _share(key, hit, value)
+    return {"level_average": dataclasses.replace(share, place_columns=2)}
 
 
 def of_bin(record: BinMap) -> dict[str, Outcomes]:
@@ -179,8 +183,10 @@ def compare_outcomes(name: str, before: Outcomes, after: Outcomes) -> Change:
     pairs = len(a)
     if not pairs:
         return Change()
-    gained, lost = int(((a == 0) & (b == 1)).sum()), int(((a == 1) & (b == 0)).sum())
-    low, high = paired_interval(gained, lost, pairs)
+    gained, lost = int((b > a).sum()), int((b < a).sum())
+    where = np.round(before.key[in_a][:, : before.place_columns], 2)
+    _, cluster = np.unique(where, axis=0, return_inverse=True)
+    p_value, low, high = clustered_shares(b - a, cluster.ravel())
     return Change(
         pairs=pairs,
         gained=gained,
@@ -188,7 +194,7 @@ def compare_outcomes(name: str, before: Outcomes, after: Outcomes) -> Change:
         change=100.0 * (gained - lost) / pairs,
         change_low=100.0 * low,
         change_high=100.0 * high,
-        p_value=mcnemar_exact(gained, lost),
+        p_value=p_value,
     )
 
 
