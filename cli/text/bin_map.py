@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from reachmap.cli.text.cycle import cycle_lines
 from reachmap.cli.text.evidence import cause_lines, verdict_text
 from reachmap.cli.text.tables import fact_lines, table_lines
 from reachmap.maps.summary.bin import MEASURES, BinSummary, Spread
@@ -37,6 +38,7 @@ def bin_lines(summary: BinSummary) -> list[str]:
         *share_lines(summary.shares),
         *_clearance_lines(summary.clearances),
         *_emptying_lines(summary.emptying),
+        *cycle_lines(summary.cycle),
         "",
         "Reached after n attempts (Wilson interval)",
         *table_lines(rows, ">>>>>"),

@@ -7,16 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from reachmap._typing import FloatArray
+from reachmap.cli.text.cycle import throughput_text
+from reachmap.maps.cycle.seconds import TO_GRASP, throughput_of
 from reachmap.ranking.answers.ranked_list import RankedList, quadrant_ranks
 from reachmap.ranking.lookup.order import status_name
 from reachmap.ranking.lookup.table import TERMS
-from reachmap.ranking.terms.seconds import (
-    FAILURE,
-    PLANNING,
-    TO_GRASP,
-    Throughput,
-    throughput_of,
-)
+from reachmap.ranking.terms.seconds import FAILURE, PLANNING
 from reachmap.text import printable
 
 TABLE_ROWS = 10
@@ -84,14 +80,6 @@ def _rate(ranked: RankedList) -> str:
     """Picks per hour, where the cost is in seconds."""
     made = throughput_of(ranked.ranking.cost) if ranked.in_seconds else None
     return "" if made is None else f"; {throughput_text(made)}"
-
-
-def throughput_text(made: Throughput) -> str:
-    """Picks per hour with their interval, as ``412 picks per hour (395 to 430)``."""
-    text = f"{made.picks_per_hour:.0f} picks per hour"
-    if np.isfinite(made.low):
-        text += f" ({made.low:.0f} to {made.high:.0f})"
-    return text
 
 
 def _aligned(lines: list[list[str]]) -> list[str]:

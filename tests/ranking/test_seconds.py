@@ -12,30 +12,16 @@ from jsonschema import Draft202012Validator
 
 from reachmap.errors import SettingsError
 from reachmap.maps import write_bin_map
+from reachmap.maps.cycle.seconds import throughput_of
 from reachmap.maps.parts import StageStatus
 from reachmap.ranking import Ranker
 from reachmap.ranking.lookup.order import status_name
-from reachmap.ranking.terms.seconds import throughput_of
 from reachmap.tools.schema import schema
 from tests.support.command_line import reachmap
+from tests.support.cycle_maps import WAITS_S, with_cycles
 from tests.support.ranking_maps import make_bin_map
-from tests.support.synthetic_maps import synthetic_bin_map
-from tests.support.synthetic_parts import bin_with_parts
 
 DOWN = np.array([[0.0, 0.0, -1.0]])
-WAITS_S = 1.5
-
-
-def with_cycles(**changes: Any) -> Any:
-    """A map whose cycles are the way in, two stages and 1.5 s of waits."""
-    bin_map = bin_with_parts(synthetic_bin_map(**changes))
-    cycle = bin_map.cycle
-    assert cycle is not None
-    assert bin_map.best is not None
-    time = bin_map.best.execution_time + cycle.time.sum(axis=-1) + WAITS_S
-    whole = np.isfinite(cycle.cycle_time)
-    cycle = dataclasses.replace(cycle, cycle_time=np.where(whole, time, np.nan))
-    return dataclasses.replace(bin_map, cycle=cycle)
 
 
 def test_seconds_of_a_pick_by_hand():

@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 from reachmap._typing import FloatArray
 from reachmap.errors import SettingsError
 from reachmap.maps.base.record import BasePlacement
+from reachmap.maps.cycle.summary import summarise_cycle
 from reachmap.maps.records import BinMap, BinPlacement, WorkspaceMap
 from reachmap.maps.robustness.record import Robustness
 from reachmap.maps.study.record import Study
@@ -24,6 +25,7 @@ from reachmap.plots.base import draw_base
 from reachmap.plots.bin_map import (
     draw_clearance,
     draw_costs,
+    draw_cycle,
     draw_directions,
     draw_reachability,
 )
@@ -32,6 +34,7 @@ from reachmap.plots.comparison import MapChange, draw_change_sheet, draw_compari
 from reachmap.plots.curves.emptying import draw_emptying
 from reachmap.plots.curves.robustness import draw_robustness
 from reachmap.plots.curves.saturation import draw_saturation
+from reachmap.plots.curves.timeline import draw_timeline
 from reachmap.plots.heatmap import draw_level
 from reachmap.plots.overview import draw_overview
 from reachmap.plots.parts.bin_view import percent_after
@@ -172,6 +175,10 @@ def bin_album(
     if emptying is not None:
         title = f"Emptying: {emptying.sentence}"
         items.append(_picture("bin_emptying", title, draw_emptying, bin_map, emptying))
+    cycle = summarise_cycle(bin_map)
+    if cycle is not None and cycle.whole:
+        title = f"Timeline: {cycle.sentence}"
+        items.append(_picture("bin_timeline", title, draw_timeline, bin_map, cycle))
     return [*items, _causes_picture(bin_map, "bin_causes")]
 
 
@@ -196,6 +203,9 @@ def _layer_pictures(
     if bin_map.margins is not None:
         title = "Clearance on the way in"
         yield _picture(f"bin_clearance{end}", title, draw_clearance, bin_map, layer)
+    if bin_map.cycle is not None:
+        title = "Whole picks in the bin"
+        yield _picture(f"bin_cycle{end}", title, draw_cycle, bin_map, layer, **style)
 
 
 def placement_album(

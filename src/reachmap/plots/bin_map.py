@@ -159,6 +159,7 @@ class _Panel:
     unit: str
     values: FloatArray
     digits: int
+    percent: bool = False
 
     def text(self, value: float) -> str:
         return MISSING if np.isnan(value) else f"{value:.{self.digits}f}"
@@ -196,6 +197,39 @@ def draw_clearance(bin_map: BinMap, layer: int = 0) -> Figure:
 
 
 @drawing()
+def draw_cycle(
+    bin_map: BinMap, layer: int = 0, *, percent_map: PercentMap = "RdYlGn"
+) -> Figure:
+    """Whole cycles at each point [percent], and their mean time [s].
+
+    Parameters
+    ----------
+    bin_map : BinMap
+        With a cycle.
+    layer : int
+        Index of the layer of test grasps.
+    """
+    cycle = bin_map.cycle
+    if cycle is None:
+        raise ValueError("the bin map has no cycles")
+    seconds = _mean(cycle.cycle_time[layer])
+    panels = [
+        _Panel(
+            title="Whole cycles",
+            unit="%",
+            values=cycle.reachability[layer],
+            digits=1,
+            percent=True,
+        ),
+        _Panel(title="Cycle time", unit="s", values=seconds, digits=_digits(seconds)),
+    ]
+    view = view_of(bin_map)
+    said = f"test grasps with lift, transfer and way back · {_subtitle(view, layer)}"
+    title = "Whole picks in the bin"
+    return _draw_panels(bin_map, view, panels, title, said, percent_map)
+
+
+@drawing()
 def draw_costs(
     bin_map: BinMap, cost: FloatArray | None = None, layer: int = 0
 ) -> Figure:
@@ -225,6 +259,7 @@ def _draw_panels(
     panels: Sequence[_Panel],
     title: str,
     subtitle: str,
+    percent_map: PercentMap = "RdYlGn",
 ) -> Figure:
     """Two panels a row, each with its own scale."""
     rows = -(-len(panels) // 2)
@@ -242,8 +277,8 @@ def _draw_panels(
             bin_map.x,
             bin_map.y,
             panel.values,
-            colours=colour_map(COST_MAP),
-            scale=_range(panel.values),
+            colours=colour_map(percent_map if panel.percent else COST_MAP),
+            scale=PERCENT_SCALE if panel.percent else _range(panel.values),
             text=panel.text,
             font_size=number_size(bin_map.x, bin_map.y, scale_in, 4),
         )

@@ -148,7 +148,8 @@ def in_seconds(names: Sequence[str]) -> bool:
     return all(name.endswith("_s") for name in names)
 
 
-def _colours(names: Sequence[str]) -> list[str]:
+def part_colours(names: Sequence[str]) -> list[str]:
+    """Colours of terms, the same for a name wherever it is drawn."""
     others = cycle(OTHER_COLOURS)
     return [TERM_COLOURS.get(name) or next(others) for name in names]
 
@@ -164,7 +165,7 @@ def _draw_bar(
             x, limit * 0.985, text, ha="center", va="top", fontsize=6.6, color=INK
         )
     bottom = 0.0
-    for value, colour in zip(_means(terms), _colours(names), strict=True):
+    for value, colour in zip(_means(terms), part_colours(names), strict=True):
         axes.bar(x, value, BAR_WIDTH, bottom=bottom, color=colour, zorder=2)
         bottom += float(value)
     if unreachable < len(terms):
@@ -205,7 +206,7 @@ def _legend(
     left = 0.75 / float(figure.get_size_inches()[0])
     handles = [
         Patch(color=colour, label=term_label(name))
-        for colour, name in zip(_colours(names), names, strict=True)
+        for colour, name in zip(part_colours(names), names, strict=True)
     ]
     orders = [terms[:top] for g in groups for terms in (g.supplied, g.ranked)]
     if any(np.isnan(terms).any() for terms in orders):

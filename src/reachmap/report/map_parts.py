@@ -42,6 +42,7 @@ from reachmap.report.blocks import (
     section,
     table,
 )
+from reachmap.report.cycle_part import cycle_blocks
 from reachmap.report.numbers import MINUS, count, interval, number, percent, signed
 
 REASONS_SHOWN = 6
@@ -226,6 +227,7 @@ def bin_section(record: BinMap) -> Section:
         ),
         _quadrant_table(summary),
         _emptying(record, summary),
+        cycle_blocks(record),
         pictures,
         _shares_paragraph(summary),
         _saturation(record),

@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 
 from reachmap._typing import FloatArray
+from reachmap.maps.cycle.seconds import TO_GRASP
 from reachmap.maps.format.registry import Artefact
 from reachmap.plots.ranking import MAX_GROUPS, CostGroup, ranking_chart, term_label
 from reachmap.ranking.answers.ranked_list import QUADRANT_ORDER, TERM_NAMES
 from reachmap.ranking.lookup.table import TERMS
-from reachmap.ranking.terms.seconds import FAILURE, PLANNING, TO_GRASP
+from reachmap.ranking.terms.seconds import FAILURE, PLANNING
 from reachmap.report.blocks import (
     Blocks,
     Heading,

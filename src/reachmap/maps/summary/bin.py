@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from reachmap._typing import BoolArray, FloatArray
+from reachmap.maps.cycle.summary import CycleSummary, summarise_cycle
 from reachmap.maps.records import BinMap, Status
 from reachmap.maps.summary.clearance import ClearanceShare, clearance_shares
 from reachmap.maps.summary.directions import ReachedShares, reached_shares
@@ -134,6 +135,8 @@ class BinSummary:
     clearances : tuple of ClearanceShare
         Test grasps by the clearance of their best path; empty where the map does not
         tell.
+    cycle : CycleSummary or None
+        What follows the grasps; None where the map does not tell.
     """
 
     grasps: int
@@ -152,6 +155,7 @@ class BinSummary:
     unreached: EvidenceSummary | None
     emptying: Emptying | None
     clearances: tuple[ClearanceShare, ...]
+    cycle: CycleSummary | None
 
 
 def summarise_bin(record: BinMap) -> BinSummary:
@@ -173,6 +177,7 @@ def summarise_bin(record: BinMap) -> BinSummary:
         unreached=_unreached(record),
         emptying=emptying_of(record),
         clearances=clearance_shares(record),
+        cycle=summarise_cycle(record),
     )
 
 

@@ -13,6 +13,7 @@ from reachmap._typing import FloatArray
 from reachmap.errors import SettingsError
 from reachmap.geometry import rotation_from_quaternion_wxyz, transform_from_parts
 from reachmap.maps.bytes.to_json import json_ready
+from reachmap.maps.cycle.seconds import throughput_of
 from reachmap.ranking.answers.doubts import list_doubts
 from reachmap.ranking.answers.ranked_list import RankedList
 from reachmap.ranking.lists.arrays import GraspList
@@ -23,7 +24,6 @@ from reachmap.ranking.lookup.queries import queries_from_arrays
 from reachmap.ranking.lookup.ranker import Ranker
 from reachmap.ranking.lookup.settings import RankSettings
 from reachmap.ranking.lookup.table import TERMS
-from reachmap.ranking.terms.seconds import throughput_of
 
 
 def rank_list(

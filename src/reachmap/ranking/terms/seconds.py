@@ -1,4 +1,4 @@
-"""Predicted seconds per pick, stage by stage, and what they make an hour.
+"""Predicted seconds per pick, stage by stage.
 
 A pick over a test grasp takes the time of its cycle, which is cut into the way to the
 grasp, the stages that follow and the waits; to it come the planning effort and what a
@@ -8,17 +8,15 @@ failure costs times its probability.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final
 
 import numpy as np
 
 from reachmap._typing import BoolArray, CodeArray, FloatArray
+from reachmap.maps.cycle.seconds import cycle_parts, failing_stage
 from reachmap.maps.parts import StageStatus
 from reachmap.maps.records import BinMap, freeze
 
-TO_GRASP, WAITS, PLANNING, FAILURE = "to_grasp_s", "waits_s", "planning_s", "failure_s"
-NORMAL_95: Final = 1.96
-"""Half width of a 95 % interval in standard errors."""
+PLANNING, FAILURE = "planning_s", "failure_s"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -64,74 +62,14 @@ def cycle_seconds(bin_map: BinMap, status: CodeArray) -> CycleSeconds | None:
     status : uint8 array, shape (points, orientations)
         Of the grasps themselves.
     """
-    cycle = bin_map.cycle
-    if cycle is None:
+    if bin_map.cycle is None:
         return None
-    stages = len(cycle.stages)
-    rest = cycle.cycle_time - cycle.time.sum(axis=-1)
-    # The way in of the cycle is the best path; all else is waits.
-    way_in = rest if bin_map.best is None else bin_map.best.execution_time
-    to_grasp = np.minimum(way_in, rest)
-    values = np.concatenate(
-        [to_grasp[..., None], cycle.time, (rest - to_grasp)[..., None]], axis=-1
-    )
-    values[np.isnan(cycle.cycle_time)] = np.nan
-    failed = cycle.status != StageStatus.PATH_FOUND
-    first = np.take_along_axis(cycle.status, failed.argmax(axis=-1)[..., None], -1)
-    lost = (
-        (status == StageStatus.PATH_FOUND)
-        & failed.any(axis=-1).reshape(status.shape)
-    )  # fmt: skip
+    names, values = cycle_parts(bin_map)
+    stage = failing_stage(bin_map.cycle)
+    ended = np.take_along_axis(bin_map.cycle.status, stage[..., None], -1)
+    lost = (status == StageStatus.PATH_FOUND) & (stage >= 0).reshape(status.shape)
     return CycleSeconds(
-        names=(TO_GRASP, *(f"{name}_s" for name in cycle.stages), WAITS),
-        values=values.reshape(*status.shape, stages + 2),
-        status=np.where(lost, first.reshape(status.shape), status),
-    )
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Throughput:
-    """How many picks an hour makes.
-
-    Attributes
-    ----------
-    picks : int
-        Picks or places that the mean is taken over.
-    seconds : float
-        Mean of a pick [s].
-    picks_per_hour : float
-    low, high : float
-        Ends of a 95 % interval of the mean, if these picks are a sample of those to
-        come; NaN for a single one.
-    """
-
-    picks: int
-    seconds: float
-    picks_per_hour: float
-    low: float
-    high: float
-
-
-def throughput_of(seconds: FloatArray) -> Throughput | None:
-    """Picks per hour of predicted seconds, shape (n,); None of none.
-
-    Examples
-    --------
-    >>> round(throughput_of(np.array([9.0, 10.0, 11.0])).picks_per_hour)
-    360
-    """
-    seconds = seconds[np.isfinite(seconds)]
-    if not len(seconds):
-        return None
-    mean, low, high = float(seconds.mean()), float("nan"), float("nan")
-    if len(seconds) > 1:
-        error = NORMAL_95 * float(seconds.std(ddof=1)) / np.sqrt(len(seconds))
-        low = 3600.0 / (mean + error)
-        high = 3600.0 / (mean - error) if error < mean else float("inf")
-    return Throughput(
-        picks=len(seconds),
-        seconds=mean,
-        picks_per_hour=3600.0 / mean,
-        low=low,
-        high=high,
+        names=names,
+        values=values.reshape(*status.shape, len(names)),
+        status=np.where(lost, ended.reshape(status.shape), status),
     )

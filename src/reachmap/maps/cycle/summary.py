@@ -1,0 +1,174 @@
+"""The cycles of a bin map in a few numbers."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+
+import numpy as np
+
+from reachmap.maps.cycle.seconds import (
+    TO_GRASP,
+    Throughput,
+    cycle_parts,
+    failing_stage,
+    throughput_of_bin,
+)
+from reachmap.maps.parts import StageStatus
+from reachmap.maps.records import BinMap, Status
+
+SHOWN = {TO_GRASP: "way to the grasp"}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PartSeconds:
+    """One part of the cycle, over the test grasps with a whole one.
+
+    Attributes
+    ----------
+    name : str
+        ``way to the grasp``, a stage, or ``waits``.
+    seconds : float
+        Mean [s].
+    share : float
+        Of the mean cycle, 0 to 1.
+    """
+
+    name: str
+    seconds: float
+    share: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CycleEnd:
+    """How cycles end before the robot is back, over reached test grasps.
+
+    Attributes
+    ----------
+    stage, status : str
+    pair : str
+        Bodies in the way, "" where none are known.
+    grasps : int
+    """
+
+    stage: str
+    status: str
+    pair: str
+    grasps: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CycleSummary:
+    """Cycles of a bin map.
+
+    Attributes
+    ----------
+    reached : int
+        Test grasps with a way in.
+    whole : int
+        Those of them with a whole cycle.
+    reachability : float
+        Test grasps with a whole cycle [percent].
+    seconds, least, median, most : float
+        Mean, extremes and median of the cycle time [s]; NaN without a whole cycle.
+    parts : tuple of PartSeconds
+    ends : tuple of CycleEnd
+        Most frequent first.
+    drop_offs : tuple of int
+        Whole cycles by the place where the part goes, counted as in the cell.
+    throughput : Throughput or None
+    """
+
+    reached: int
+    whole: int
+    reachability: float
+    seconds: float
+    least: float
+    median: float
+    most: float
+    parts: tuple[PartSeconds, ...]
+    ends: tuple[CycleEnd, ...]
+    drop_offs: tuple[int, ...]
+    throughput: Throughput | None
+
+    @property
+    def sentence(self) -> str:
+        """What a pick takes, in words."""
+        if self.throughput is None:
+            return "no test grasp has a whole cycle"
+        longest = max(self.parts, key=lambda part: part.seconds)
+        return (
+            f"a pick takes {self.seconds:.2f} s on average, most of all the "
+            f"{longest.name} ({100 * longest.share:.0f} %)"
+        )
+
+
+def summarise_cycle(record: BinMap) -> CycleSummary | None:
+    """Count cycles and add up their parts; None for a map without them."""
+    cycle = record.cycle
+    if cycle is None:
+        return None
+    whole = np.isfinite(cycle.cycle_time)
+    known = cycle.cycle_time[whole]
+    nan = float("nan")
+    low, middle, high = np.quantile(known, (0, 0.5, 1)) if len(known) else (nan,) * 3
+    places = cycle.drop_off[whole & (cycle.drop_off >= 0)]
+    attempted = int((record.status != Status.NOT_ATTEMPTED).sum())
+    return CycleSummary(
+        reached=int((record.status == Status.PATH_FOUND).sum()),
+        whole=int(whole.sum()),
+        reachability=100.0 * int(whole.sum()) / attempted if attempted else nan,
+        seconds=float(known.mean()) if len(known) else nan,
+        least=float(low),
+        median=float(middle),
+        most=float(high),
+        parts=_parts(record),
+        ends=_ends(record),
+        drop_offs=tuple(np.bincount(places).tolist()) if places.size else (),
+        throughput=throughput_of_bin(record),
+    )
+
+
+def _parts(record: BinMap) -> tuple[PartSeconds, ...]:
+    names, seconds = cycle_parts(record)
+    known = seconds[np.isfinite(seconds[..., 0])]
+    if not len(known):
+        return ()
+    means = known.mean(axis=0)
+    shares = means / max(float(means.sum()), 1e-12)
+    return tuple(
+        PartSeconds(
+            name=SHOWN.get(name) or name.removesuffix("_s").replace("_", " "),
+            seconds=mean,
+            share=share,
+        )
+        for name, mean, share in zip(
+            names, means.tolist(), shares.tolist(), strict=True
+        )
+        if mean > 0.0
+    )
+
+
+def _ends(record: BinMap) -> tuple[CycleEnd, ...]:
+    cycle = record.cycle
+    assert cycle is not None
+    stage = failing_stage(cycle)
+    lost = (record.status == Status.PATH_FOUND) & (stage >= 0)
+    at = (*np.nonzero(lost), stage[lost])
+    counts = Counter(
+        zip(
+            stage[lost].tolist(),
+            cycle.status[at].tolist(),
+            cycle.blocking_pair[at].tolist(),
+            strict=True,
+        )
+    )
+    return tuple(
+        CycleEnd(
+            stage=cycle.stages[number],
+            status=StageStatus(status).name.lower().replace("_", " "),
+            pair=record.body_pairs[pair] if pair >= 0 else "",
+            grasps=grasps,
+        )
+        for (number, status, pair), grasps in counts.most_common()
+    )

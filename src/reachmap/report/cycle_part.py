@@ -1,0 +1,64 @@
+"""What a pick takes, where its seconds go, and where cycles end early."""
+
+from __future__ import annotations
+
+from reachmap.maps.cycle.summary import CycleSummary, summarise_cycle
+from reachmap.maps.records import BinMap
+from reachmap.plots.bin_map import draw_cycle
+from reachmap.plots.curves.timeline import draw_timeline
+from reachmap.plots.parts.levels import level_names
+from reachmap.report.blocks import Blocks, Heading, drawn, paragraph, table
+from reachmap.report.numbers import count, number, percent
+
+ENDS_SHOWN = 12
+
+
+def cycle_blocks(record: BinMap) -> Blocks:
+    """Blocks on the cycles of a bin map; None for a map without them."""
+    cycle = summarise_cycle(record)
+    if cycle is None:
+        return None
+    blocks: list[Blocks] = [
+        Heading("Whole picks"),
+        paragraph(_words(cycle)),
+    ]
+    for layer, name in enumerate(level_names(record.layer)):
+        where = (
+            f" in the layer {name} m above the bottom" if len(record.layer) > 1 else ""
+        )
+        blocks.append(
+            drawn(
+                draw_cycle(record, layer),
+                f"Test grasps with a whole cycle, and its mean time{where}.",
+                record,
+            )
+        )
+    if cycle.whole:
+        said = (
+            "Where the seconds of a pick go; lines span the middle 80 % of each part."
+        )
+        blocks.append(drawn(draw_timeline(record, cycle), said, record))
+    if cycle.ends:
+        rows = [
+            (end.grasps, end.stage, end.status, end.pair)
+            for end in cycle.ends[:ENDS_SHOWN]
+        ]
+        head = ("test grasps", "stage", "what became of it", "bodies in the way")
+        blocks.append(table(head, rows, "><<<"))
+    return blocks
+
+
+def _words(cycle: CycleSummary) -> str:
+    text = (
+        f"Of {count(cycle.reached, 'test grasp')} with a way in, {cycle.whole} have a "
+        f"whole cycle ({percent(cycle.reachability)} of all test grasps): "
+        f"{cycle.sentence}."
+    )
+    made = cycle.throughput
+    if made is None:
+        return text
+    return (
+        f"{text} With the planning effort and the risk of failure that is "
+        f"{number(made.picks_per_hour, 0)} picks per hour "
+        f"(95 % interval {number(made.low, 0)} to {number(made.high, 0)})."
+    )
