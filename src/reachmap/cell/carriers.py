@@ -8,12 +8,12 @@ from functools import cache
 from importlib.resources import files
 from typing import Any
 
+from reachmap.cell.several_bins import bin_places
 from reachmap.cell.text.data import at, text_at
 from reachmap.cell.text.messages import did_you_mean
 from reachmap.cell.text.overrides import is_override
-from reachmap.cell.text.yaml_reader import Document
+from reachmap.cell.text.yaml_reader import Document, Location
 
-LOCATION = ("bin", "carrier")
 DIMENSIONS = ("inner", "inner_top", "wall", "bottom", "rim", "mesh")
 
 
@@ -101,30 +101,37 @@ def _plain(name: str) -> str:
     return "".join(c for c in name.casefold() if c.isalnum())
 
 
-def write_out_carrier(document: Document) -> None:
-    """Give a bin the dimensions of its carrier, where it has none of its own.
+def write_out_carriers(document: Document) -> None:
+    """Give each bin the dimensions of its carrier, where it has none of its own.
 
     A carrier that an override names takes the place of the file's own dimensions, but
     not of those that are overridden as well. An unknown name becomes a mistake.
     """
-    name, tray = text_at(document.data, *LOCATION), at(document.data, "bin")
-    if name is None:
-        return
-    carrier = find_carrier(name)
+    for _, place in bin_places(document.data):
+        if text_at(document.data, *place, "carrier") is not None:
+            _write_out_carrier(document, place)
+
+
+def _write_out_carrier(document: Document, place: Location) -> None:
+    tray, location = at(document.data, *place), (*place, "carrier")
+    carrier = find_carrier(tray["carrier"])
     if carrier is None:
-        known = [n for c in carriers() for n in (c.name, *c.also)]
+        name, known = (
+            tray["carrier"],
+            [n for c in carriers() for n in (c.name, *c.also)],
+        )
         hint = did_you_mean(name.upper(), known)
         document.add(
-            LOCATION, f"no carrier {name!r}; {hint} (`reachmap carriers` lists them)"
+            location, f"no carrier {name!r}; {hint} (`reachmap carriers` lists them)"
         )
         # What is missing for want of a carrier is no mistake of its own.
         tray.setdefault("inner", [1.0, 1.0, 1.0])
         return
     tray["carrier"] = carrier.name
     keys = carrier.keys()
-    overridden = is_override(document.place(LOCATION))
+    overridden = is_override(document.place(location))
     for key in DIMENSIONS:
-        own = ("bin", key)
+        own = (*place, key)
         is_newer = own in document.places and is_override(document.place(own))
         if tray.get(key) is None or (overridden and not is_newer):
             tray[key] = keys.get(key)

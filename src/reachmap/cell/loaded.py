@@ -18,6 +18,7 @@ from reachmap.cell.files.files import body_key
 from reachmap.cell.files.joint_limits import MoveItLimits
 from reachmap.cell.files.resources import NotFoundError, Resolver
 from reachmap.cell.files.urdf import UrdfDescription, parse_urdf
+from reachmap.cell.model.bodies import BinSpec
 from reachmap.cell.model.cell import Cell, JointValues, ScanConfiguration
 from reachmap.errors import CellError
 
@@ -132,6 +133,12 @@ class LoadedCell:
             cell = cell.model_copy(update={"scan_configuration": changed})
         return self.with_cell(cell)
 
+    def with_other_bins(self, bins: Mapping[str, BinSpec]) -> LoadedCell:
+        """Copy with other bins beside its own."""
+        if self.cell.bins == bins:
+            return self
+        return self._with_cell(self.cell.model_copy(update={"bins": dict(bins)}))
+
     def fillings(self) -> tuple[LoadedCell, ...]:
         """The cell for each level of the parts in its bin, which has no other layer.
 
@@ -179,7 +186,13 @@ def fingerprint(
     del data["description"], data["resources"]
     # The numbers that parameters lead to stand in their places.
     del data["parameters"], data["expressions"]
-    del data["bin"]["carrier"]
+    # The choice is made, and a single bin has no name.
+    del data["pick_from"]
+    if not data["bins"]:
+        del data["bins"], data["bin"]["name"]
+    others = data.get("bins", {})
+    for tray in (data["bin"], *others.values()):
+        del tray["carrier"]
     _reduce_cycle(cell, data)
     robot = data["robot"]
     # Base pose and body stand for it.
@@ -191,7 +204,9 @@ def fingerprint(
     meshes = [(body["name"], body["shape"]["mesh"]) for body in data["bodies"]]
     if (held := cell.held()) is not None:
         meshes.append((held[0], data["part"]["shape"]["mesh"]))
-    for name, mesh in [*meshes, ("bin", data["bin"]["mesh"])]:
+    meshes += [("bin", data["bin"]["mesh"])]
+    meshes += [(f"bin {name}", tray["mesh"]) for name, tray in others.items()]
+    for name, mesh in meshes:
         if mesh is not None:
             mesh["file"] = files_sha256[body_key(name, mesh["file"])]
     text = json.dumps(data, sort_keys=True, separators=(",", ":"), ensure_ascii=False)

@@ -7,21 +7,22 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from reachmap.cell.carriers import write_out_carrier
+from reachmap.cell.carriers import write_out_carriers
 from reachmap.cell.files.files import compare_hashes, read_files, stored_files
 from reachmap.cell.files.resources import shipped_folder
 from reachmap.cell.filling import write_out_fill
 from reachmap.cell.loaded import LoadedCell, fingerprint
 from reachmap.cell.model.cell import Cell
 from reachmap.cell.mounting import (
-    check_bin_stands,
+    check_bins_stand,
     leaning_levels,
     write_out_mount,
 )
 from reachmap.cell.pick_cycle import check_part_choice
 from reachmap.cell.references import check_names, find_doubts
 from reachmap.cell.resolution import resolved_cell, validated
-from reachmap.cell.support import stood_on_support
+from reachmap.cell.several_bins import gather_bins, write_out_bins
+from reachmap.cell.support import stood_on_supports
 from reachmap.cell.text.expressions import resolve_expressions, restore_expressions
 from reachmap.cell.text.messages import did_you_mean
 from reachmap.cell.text.overrides import apply_overrides
@@ -104,11 +105,13 @@ def cell_from_text(
     document = parse_yaml(text, label)
     if not isinstance(document.data, dict):
         raise CellError(f"{label}:1:1: expected a mapping with format: reachmap.cell")
+    gather_bins(document)
     restore_expressions(document)
     apply_overrides(document, overrides, Cell)
     resolve_expressions(document)
     write_out_mount(document)
-    write_out_carrier(document)
+    write_out_bins(document)
+    write_out_carriers(document)
     write_out_fill(document)
     check_part_choice(document)
     cell = validated(document)
@@ -204,8 +207,8 @@ def cell_from_json(
         check_names(document, files.robot, files.srdf_description)
     compare_hashes(document, files, files_sha256 or {})
     if changes:
-        check_bin_stands(document, cell)
-        cell = stood_on_support(document, cell)
+        check_bins_stand(document, cell)
+        cell = stood_on_supports(document, cell)
     document.raise_mistakes()
     return LoadedCell(
         cell=cell,
@@ -249,11 +252,13 @@ def stored_cell(
         raise CellError(f"{source}: the cell is not JSON: {error}") from None
     if not isinstance(document.data, dict):
         raise CellError(f"{source}: the cell is not a JSON object")
+    gather_bins(document)
     restore_expressions(document)
     apply_overrides(document, changes, Cell)
     resolve_expressions(document)
     write_out_mount(document)
-    write_out_carrier(document)
+    write_out_bins(document)
+    write_out_carriers(document)
     write_out_fill(document)
     check_part_choice(document)
     cell = validated(document)

@@ -105,22 +105,25 @@ def _body_of(mount: MountSpec) -> dict[str, Any] | None:
     }
 
 
-def check_bin_stands(document: Document, cell: Cell) -> None:
-    """Add a mistake where the bin stands on its side or its head in the world."""
-    T_world_bin = inverse_transform(cell.T_base_world()) @ cell.T_base_bin()
-    tilt = float(np.degrees(tilt_rad(T_world_bin[:3, :3])))
-    if tilt <= MAX_BIN_TILT_DEG:
-        return
-    hint = (
-        "robot_base itself leans, so give the pose in the world with bin.frame: world"
-        if cell.bin.frame == "robot_base"
-        else "its z axis must point up"
-    )
-    document.add(
-        ("bin", "pose"),
-        f"the bin stands {tilt:.0f} deg off the upright in the world and would spill "
-        f"(allowed: {MAX_BIN_TILT_DEG:g}); {hint}",
-    )
+def check_bins_stand(document: Document, cell: Cell) -> None:
+    """Add a mistake where a bin stands on its side or its head in the world."""
+    T_world_base = inverse_transform(cell.T_base_world())
+    for place, spec in cell.every_bin():
+        T_world_bin = T_world_base @ cell.T_base_of(spec)
+        tilt = float(np.degrees(tilt_rad(T_world_bin[:3, :3])))
+        if tilt <= MAX_BIN_TILT_DEG:
+            continue
+        hint = (
+            "robot_base itself leans, so give the pose in the world with "
+            f"{'.'.join(place)}.frame: world"
+            if spec.frame == "robot_base"
+            else "its z axis must point up"
+        )
+        document.add(
+            (*place, "pose"),
+            f"the bin stands {tilt:.0f} deg off the upright in the world and would "
+            f"spill (allowed: {MAX_BIN_TILT_DEG:g}); {hint}",
+        )
 
 
 def leaning_levels(cell: Cell) -> str:

@@ -67,7 +67,7 @@ def check_cycle_names(document: Document, robot: UrdfDescription) -> None:
                 f"{frame!r} is neither world, robot_base, bin nor a body that stands "
                 f"still; {hint}",
             )
-    known = [*robot.links, *bodies, "bin"]
+    known = [*robot.links, *bodies, "bin", *(at(data, "bins") or {})]
     has_part = False
     for _, place in part_places(data):
         has_part |= isinstance(at(data, *place), dict)

@@ -18,6 +18,7 @@ from reachmap.cell.model.cell import Cell
 from reachmap.cell.model.fields import MAX_LENGTH_M
 from reachmap.cell.model.shapes import sides
 from reachmap.cell.pick_cycle import check_cycle_names, joint_value_places
+from reachmap.cell.several_bins import bin_places
 from reachmap.cell.text.data import at, entries, text_at
 from reachmap.cell.text.messages import did_you_mean
 from reachmap.cell.text.yaml_reader import Document, Location
@@ -31,6 +32,7 @@ def check_names(
     """Add a mistake for every frame, joint, group or body that does not exist."""
     _check_frames(document, robot)
     _check_body_names(document, robot)
+    _check_bin_names(document, robot)
     _check_touch(document, robot)
     check_cycle_names(document, robot)
     _check_srdf_names(document, srdf)
@@ -104,12 +106,25 @@ def _check_body_names(document: Document, robot: UrdfDescription) -> None:
             document.add(("bodies", index, "name"), message)
 
 
+def _check_bin_names(document: Document, robot: UrdfDescription) -> None:
+    """Check that no bin shares its name with something else."""
+    taken = {*robot.links, *WORLD, *_body_names(document), "bin"}
+    names = [place[-1] for _, place in bin_places(document.data)[1:]]
+    own = text_at(document.data, "bin", "name")
+    for name in [*names, *([] if own is None else [own])]:
+        if name in taken:
+            message = f"{name!r} is the name of a link, a frame or a body"
+            document.add(("bins", name), message, of_key=True)
+
+
 def _check_touch(document: Document, robot: UrdfDescription) -> None:
     bodies = entries(document.data, "bodies")
     names = [text_at(body, "name") or "" for body in bodies]
-    known = [*robot.links, *(name for name in names if name), "bin"]
+    places = bin_places(document.data)
+    bins = [label.removeprefix("bin ") for label, _ in places]
+    known = [*robot.links, *(name for name in names if name), *bins]
     lists: list[Location] = [("bodies", i, "touch") for i in range(len(bodies))]
-    for location in [*lists, ("bin", "touch")]:
+    for location in [*lists, *((*place, "touch") for _, place in places)]:
         for index, name in enumerate(entries(document.data, *location)):
             if isinstance(name, str) and name not in known:
                 message = f"no link or body {name!r}; {did_you_mean(name, known)}"

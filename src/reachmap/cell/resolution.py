@@ -13,10 +13,10 @@ from reachmap.cell.files.files import CellFiles
 from reachmap.cell.files.joint_limits import tighten_limits
 from reachmap.cell.files.resources import SCHEME, SHIPPED, Resolver, shipped_folder
 from reachmap.cell.model.cell import Cell
-from reachmap.cell.mounting import check_bin_stands, write_out_base_pose
+from reachmap.cell.mounting import check_bins_stand, write_out_base_pose
 from reachmap.cell.pick_cycle import joint_value_places
 from reachmap.cell.references import moving_joints
-from reachmap.cell.support import stood_on_support
+from reachmap.cell.support import stood_on_supports
 from reachmap.cell.text.data import at
 from reachmap.cell.text.messages import add_validation_errors
 from reachmap.cell.text.yaml_reader import Document
@@ -61,7 +61,12 @@ def resolved_cell(
             robot[key] = _portable(robot[key], files.resolver)
     solids = [*data["bodies"], *data["parts"].values()]
     solids += [data["part"]] if isinstance(data["part"], dict) else []
-    for mesh in (*(solid["shape"]["mesh"] for solid in solids), data["bin"]["mesh"]):
+    trays = [data["bin"], *data["bins"].values()]
+    meshes = [
+        *(solid["shape"]["mesh"] for solid in solids),
+        *(t["mesh"] for t in trays),
+    ]
+    for mesh in meshes:
         if mesh:
             mesh["file"] = _portable(mesh["file"], files.resolver)
     _write_out_srdf(document, data, files)
@@ -76,8 +81,8 @@ def resolved_cell(
         add_validation_errors(document, error, Cell)
         document.raise_mistakes()
         raise
-    check_bin_stands(document, resolved)
-    resolved = stood_on_support(document, resolved)
+    check_bins_stand(document, resolved)
+    resolved = stood_on_supports(document, resolved)
     document.raise_mistakes()
     return resolved
 

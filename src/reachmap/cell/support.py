@@ -11,7 +11,7 @@ from reachmap._typing import FloatArray
 from reachmap.cell.model.bodies import BinSpec, BodySpec
 from reachmap.cell.model.cell import Cell
 from reachmap.cell.model.shapes import triangles_of
-from reachmap.cell.text.yaml_reader import Document
+from reachmap.cell.text.yaml_reader import Document, Location
 from reachmap.geometry import inverse_transform, tilt_rad
 
 # Points of a shape this far below its highest one still belong to its top face; a
@@ -106,35 +106,45 @@ def support_of(spec: BinSpec, T_to_bin: FloatArray, faces: tuple[TopFace, ...]) 
     return next(under, "")
 
 
-def stood_on_support(document: Document, cell: Cell) -> Cell:
-    """The cell with its bin on the body that ``bin.on`` names, if it names one.
+def stood_on_supports(document: Document, cell: Cell) -> Cell:
+    """The cell with its bins on the bodies that their ``on`` names, if they name any.
 
     Mistakes are added to the document where the body has no level top face, the bin
     does not fit on it, or leans.
     """
-    name = cell.bin.on
-    if name is None:
-        return cell
-    where = ("bin", "on")
+    for place, spec in cell.every_bin():
+        if spec.on is None:
+            continue
+        T_base_bin = _stood(document, cell, spec, (*place, "on"))
+        if T_base_bin is not None:
+            cell = cell.with_spec_at(spec, T_base_bin, spec.frame)
+    return cell
+
+
+def _stood(
+    document: Document, cell: Cell, spec: BinSpec, where: Location
+) -> FloatArray | None:
+    """T_base_bin of a bin that stands on the body that it names."""
     T_base_world = cell.T_base_world()
-    T_world_bin = inverse_transform(T_base_world) @ cell.T_base_bin()
-    faces = [face for face in top_faces(cell, np.eye(4)) if face.name == name]
+    T_world_bin = inverse_transform(T_base_world) @ cell.T_base_of(spec)
+    every, name = top_faces(cell, np.eye(4)), spec.on
+    faces = [face for face in every if face.name == name]
     if not faces:
-        known = ", ".join(face.name for face in top_faces(cell, np.eye(4))) or "none"
+        known = ", ".join(face.name for face in every) or "none"
         document.add(
             where,
             f"{name!r} is no body with a level top face that is attached to world or "
             f"robot_base (those are: {known})",
         )
-        return cell
+        return None
     if np.degrees(tilt_rad(T_world_bin[:3, :3])) > STEADY_DEG:
         document.add(where, f"the bin leans, so it cannot stand flat on {name!r}")
-        return cell
-    over = faces[0].overhang_m(footprint_of_bin(cell.bin, T_world_bin))
+        return None
+    over = faces[0].overhang_m(footprint_of_bin(spec, T_world_bin))
     if over > SLACK_M:
         document.add(
             where, f"the bin hangs {1e3 * over:.0f} mm over the edge of {name!r}"
         )
-        return cell
-    T_world_bin[2, 3] = faces[0].z + cell.bin.bottom_m
-    return cell.with_bin_at(T_base_world @ T_world_bin, cell.bin.frame)
+        return None
+    T_world_bin[2, 3] = faces[0].z + spec.bottom_m
+    return np.asarray(T_base_world @ T_world_bin)

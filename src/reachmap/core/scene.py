@@ -96,7 +96,9 @@ class Scene:
         """
         cell = loaded.cell
         robot = RobotModel.from_cell(loaded)
-        bodies = build_geometry(robot, loaded, with_bin=with_bin)
+        # Without its bin a scene is about the arm's surroundings: none of the bins.
+        seen = loaded if with_bin else loaded.with_other_bins({})
+        bodies = build_geometry(robot, seen, with_bin=with_bin)
         movable: dict[str, FloatArray] = {}
         if bin_moves or world_moves:
             movable |= bin_placements(robot, loaded)
@@ -257,7 +259,7 @@ class Scene:
             fit = BinFit(robot, self.loaded, None, empty=False)
             contact = fit.contact(self.T_base_bin)
             if contact is not None:
-                problems.append(f"bin.pose: {contact.pair}")
+                problems.append(f"{self.loaded.cell.bin_key}.pose: {contact.pair}")
         return tuple(problems)
 
     def tcp_path_points(self, path: FloatArray, step_rad: float = 0.02) -> FloatArray:

@@ -18,6 +18,7 @@ from reachmap.cell.files.xacro import Expansion
 from reachmap.cell.meshes.reading import MeshError, read_mesh
 from reachmap.cell.model.shapes import sides
 from reachmap.cell.pick_cycle import part_places
+from reachmap.cell.several_bins import bin_places
 from reachmap.cell.text.data import at, entries, text_at
 from reachmap.cell.text.messages import did_you_mean
 from reachmap.cell.text.yaml_reader import (
@@ -230,7 +231,8 @@ def _find_body_meshes(document: Document, files: CellFiles) -> None:
     owners += [
         (name, (*place, "shape", "mesh")) for name, place in part_places(document.data)
     ]
-    for name, location in [*owners, ("bin", ("bin", "mesh"))]:
+    owners += [(name, (*place, "mesh")) for name, place in bin_places(document.data)]
+    for name, location in owners:
         reference = text_at(document.data, *location, "file")
         if not reference:
             continue

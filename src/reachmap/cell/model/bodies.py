@@ -84,6 +84,9 @@ class BinSpec(Record):
 
     model_config = ConfigDict(json_schema_extra=_inner_or_carrier)
 
+    name: Identifier | None = Field(
+        None, description="Written by reachmap into resolved cells: its key in bins."
+    )
     carrier: Name | None = Field(
         None,
         description="A load carrier by name, see `reachmap carriers`. It fills inner, "

@@ -122,6 +122,17 @@ class Cell(Record):
         (), max_length=1000, description="Everything solid that is not in the URDF."
     )
     bin: BinSpec = Field(description="The bin that is picked from.")
+    bins: dict[Identifier, BinSpec] = Field(
+        {},
+        max_length=20,
+        description="Several bins by name, in place of bin. Each has its own placement "
+        "and map, and is an obstacle for the others.",
+    )
+    pick_from: Identifier | None = Field(
+        None,
+        description="The one of bins that scans are about, which --bin changes; "
+        "default: the first.",
+    )
     scan_configuration: ScanConfiguration = Field(
         description="Where the arm images the bin, and every path starts."
     )
@@ -193,7 +204,21 @@ class Cell(Record):
 
     def T_base_bin(self) -> FloatArray:  # noqa: N802
         """The bin in robot_base, shape (4, 4)."""
-        return self._in_base(self.bin.frame) @ self.bin.pose.matrix()
+        return self.T_base_of(self.bin)
+
+    def T_base_of(self, spec: BinSpec) -> FloatArray:  # noqa: N802
+        """One of the bins in robot_base, shape (4, 4)."""
+        return np.asarray(self._in_base(spec.frame) @ spec.pose.matrix())
+
+    def every_bin(self) -> list[tuple[tuple[str, ...], BinSpec]]:
+        """Place in the cell and description of the bin and of the others."""
+        others = ((("bins", name), spec) for name, spec in self.bins.items())
+        return [(("bin",), self.bin), *others]
+
+    @property
+    def bin_key(self) -> str:
+        """Where a cell file has the bin that is picked from."""
+        return "bin" if self.bin.name is None else f"bins.{self.bin.name}"
 
     def T_base_grid(self) -> FloatArray:  # noqa: N802
         """The frame of the workspace scan's lattice in robot_base, shape (4, 4)."""
@@ -211,13 +236,22 @@ class Cell(Record):
 
     def with_bin_at(self, T_base_bin: FloatArray, frame: BaseOrWorld) -> Cell:
         """Copy with another pose of the bin, written in a frame."""
+        return self.with_spec_at(self.bin, T_base_bin, frame)
+
+    def with_spec_at(
+        self, spec: BinSpec, T_base_bin: FloatArray, frame: BaseOrWorld
+    ) -> Cell:
+        """Copy with another pose of one of the bins, written in a frame."""
         T = inverse_transform(self._in_base(frame)) @ T_base_bin
         pose = PoseSpec(
             xyz=tuple(T[:3, 3].tolist()),
             quaternion_wxyz=tuple(quaternion_wxyz_from_rotation(T[:3, :3]).tolist()),
         )
-        placed = self.bin.model_copy(update={"pose": pose, "frame": frame})
-        return self.model_copy(update={"bin": placed})
+        placed = spec.model_copy(update={"pose": pose, "frame": frame})
+        if spec is self.bin:
+            return self.model_copy(update={"bin": placed})
+        others = {n: placed if s is spec else s for n, s in self.bins.items()}
+        return self.model_copy(update={"bins": others})
 
     def _in_base(self, frame: BaseOrWorld) -> FloatArray:
         return self.T_base_world() if frame == "world" else np.eye(4)
@@ -247,6 +281,9 @@ def _with_expressions(schema: Any) -> Any:
 def cell_schema() -> dict[str, Any]:
     """JSON Schema (draft 2020-12) of a cell, generated from the model."""
     schema: dict[str, Any] = _with_expressions(Cell.model_json_schema())
+    # A file has bin, or bins in its place, of which the loader makes one the bin.
+    schema["required"].remove("bin")
+    schema["anyOf"] = [{"required": ["bin"]}, {"required": ["bins"]}]
     named = schema["properties"]["parameters"]["patternProperties"]
     for pattern, entry in named.items():
         named[pattern] = {"anyOf": [entry, *NUMBER_OR_EXPRESSION]}

@@ -97,6 +97,20 @@ class Document:
     places: dict[Location, Place] = field(default_factory=dict)
     key_places: dict[Location, Place] = field(default_factory=dict)
     mistakes: list[Mistake] = field(default_factory=list)
+    _moved: dict[Location, Location] = field(default_factory=dict)
+
+    def move(self, written: Location, location: Location) -> None:
+        """Take what is written at one location for what is at another from now on."""
+        for places in (self.places, self.key_places):
+            for inner in [k for k in places if k[: len(written)] == written]:
+                places[(*location, *inner[len(written) :])] = places[inner]
+        self._moved[location] = written
+
+    def _as_written(self, location: Location) -> Location:
+        for moved, written in self._moved.items():
+            if location[: len(moved)] == moved:
+                return (*written, *location[len(moved) :])
+        return location
 
     def place(self, location: Location, *, of_key: bool = False) -> Place:
         """Place of a value, or of the nearest enclosing value that was written."""
@@ -110,7 +124,8 @@ class Document:
     def add(self, location: Location, message: str, *, of_key: bool = False) -> None:
         """Record a mistake at a location."""
         place = self.place(location, of_key=of_key)
-        self.mistakes.append(Mistake(place=place, location=location, message=message))
+        written = self._as_written(location)
+        self.mistakes.append(Mistake(place=place, location=written, message=message))
 
     def raise_mistakes(self) -> None:
         """Raise CellError with every mistake recorded, in the order of the file."""

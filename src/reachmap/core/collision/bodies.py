@@ -21,6 +21,7 @@ from reachmap.cell.files.srdf import parse_srdf
 from reachmap.cell.files.urdf import UrdfDescription
 from reachmap.cell.meshes.reading import MeshError, read_mesh
 from reachmap.cell.model.bin_parts import BinPart, bin_parts
+from reachmap.cell.model.bodies import BinSpec
 from reachmap.cell.model.fields import Shape
 from reachmap.cell.model.shapes import Solid
 from reachmap.cell.pick_cycle import PART
@@ -73,10 +74,14 @@ def parts_of_bin(loaded: LoadedCell) -> tuple[BinPart, ...]:
     SceneError
         The mesh cannot be read.
     """
-    spec, shell = loaded.cell.bin, None
+    return _parts_of(loaded, loaded.cell.bin, "bin")
+
+
+def _parts_of(loaded: LoadedCell, spec: BinSpec, label: str) -> tuple[BinPart, ...]:
+    shell = None
     if spec.mesh is not None:
-        key = body_key("bin", spec.mesh.file)
-        shell = _read_mesh(loaded, key, "bin", spec.mesh.scale)
+        key = body_key(label, spec.mesh.file)
+        shell = _read_mesh(loaded, key, label, spec.mesh.scale)
     return bin_parts(spec, shell)
 
 
@@ -123,7 +128,7 @@ def build_geometry(
     robot : RobotModel
     loaded : LoadedCell
     with_bin : bool
-        Whether the bin stands in the scene.
+        Whether the bin stands in the scene; other bins beside it always do.
     load : Load
         Whether the cell's part is a body, called ``part``. While it is lifted, what it
         lay on is left to :mod:`reachmap.core.planning.lift`.
@@ -147,7 +152,14 @@ def build_geometry(
         placements = bin_placements(robot, loaded)
         for part in parts_of_bin(loaded):
             builder.add(part.name, ROOT, placements[part.name], part.shape)
+    for name, spec in loaded.cell.bins.items():
+        T_root_bin = robot.T_root_base @ loaded.cell.T_base_of(spec)
+        for part in _parts_of(loaded, spec, f"bin {name}"):
+            T = T_root_bin @ transform_from_parts(np.eye(3), part.centre_m)
+            builder.add(f"{name} {part.name}", ROOT, T, part.shape)
     touches = [(body.name, body.touch) for body in loaded.cell.bodies]
+    touches += [(name, spec.touch) for name, spec in loaded.cell.bins.items()]
+    builder.others = tuple(loaded.cell.bins)
     if with_bin:
         touches.append(("bin", loaded.cell.bin.touch))
     if held is not None:
@@ -241,6 +253,7 @@ class _Builder:
         self.geometry = pin.GeometryModel()
         self.names: list[str] = []
         self.shapes: list[Solid] = []
+        self.others: tuple[str, ...] = ()
 
     def add(
         self,
@@ -269,10 +282,13 @@ class _Builder:
     def allow(
         self, touches: Iterable[tuple[str, tuple[str, ...]]], *, with_bin: bool
     ) -> None:
-        """Take out the pairs that may touch; ``bin`` stands for its parts."""
+        """Take out the pairs that may touch.
+
+        ``bin`` stands for the parts of all bins, the name of another for its own.
+        """
         model = self.robot.body_model
         links = {f.name.removesuffix(LINK_MARK) for f in model.frames}
-        known = {*self.names, *links, "world", "robot_base", "bin"}
+        known = {*self.names, *self.others, *links, "world", "robot_base", "bin"}
         problems = [
             f"body {body!r}: touch names {other!r}, which is neither a link nor a body"
             for body, others in touches
@@ -298,7 +314,14 @@ class _Builder:
                 self.geometry.removeCollisionPair(pin.CollisionPair(first, second))
 
     def _expand(self, a: str, b: str, *, with_bin: bool) -> Iterable[tuple[str, str]]:
-        parts = [n for n in self.names if with_bin and n.startswith("bin ")]
-        for first in parts if a == "bin" else [a]:
-            for second in parts if b == "bin" else [b]:
+        def parts(name: str) -> list[str]:
+            if name in self.others:
+                return [n for n in self.names if n.startswith(f"{name} bin ")]
+            if name != "bin":
+                return [name]
+            own = [n for n in self.names if with_bin and n.startswith("bin ")]
+            return own + [n for other in self.others for n in parts(other)]
+
+        for first in parts(a):
+            for second in parts(b):
                 yield first, second

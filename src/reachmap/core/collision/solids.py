@@ -137,4 +137,6 @@ class SolidCell:
 def _kind(name: str, joint: int, own: set[str]) -> Kind:
     if name in own:
         return "tool" if joint else "body"
-    return "bin" if name.startswith("bin ") and joint == 0 else "link"
+    if joint == 0 and " bin " in f" {name}":
+        return "bin" if name.startswith("bin ") else "body"
+    return "link"

@@ -97,7 +97,7 @@ def hull_outline(name: str, kind: Kind, points: FloatArray) -> Outline:
 
 
 def body_outlines(cell: Cell) -> tuple[Outline, ...]:
-    """Outlines of the bodies that stand still (attached to world or robot_base)."""
+    """Outlines of what stands still: bodies, and bins beside the cell's own."""
     T_level_base = inverse_transform(cell.T_base_level())
     frames = {"world": T_level_base @ cell.T_base_world(), "robot_base": T_level_base}
     found = []
@@ -108,6 +108,9 @@ def body_outlines(cell: Cell) -> tuple[Outline, ...]:
         points = triangles_of(body.shape).vertices
         T = frames[body.attach_to] @ body.pose.matrix()
         found.append(hull_outline(body.name, "body", _moved(T, points)))
+    for name, spec in cell.bins.items():
+        T = T_level_base @ cell.T_base_of(spec)
+        found += bin_outlines(spec, T, name=f"bin {name}", kind="body")
     return tuple(found)
 
 
