@@ -11,11 +11,13 @@ import click
 from reachmap.cli.options import (
     DEFAULT_CELL,
     INPUT_FILE,
+    bin_option,
     cell_option,
     check_scan_options,
     output_option,
     scan_options,
     unused,
+    with_bin,
 )
 from reachmap.cli.text.tables import facts_text
 from reachmap.runtime.options import RunOptions
@@ -28,6 +30,7 @@ log = logging.getLogger(__name__)
     "placement", metavar="[PLACEMENT]", type=INPUT_FILE, required=False, default=None
 )
 @cell_option
+@bin_option
 @output_option("bin.h5")
 @click.option(
     "--attempts",
@@ -46,6 +49,7 @@ log = logging.getLogger(__name__)
 def command(
     placement: Path | None,
     cell: str | None,
+    bin_name: str | None,
     output: Path,
     attempts: str | None,
     part: str | None,
@@ -69,6 +73,7 @@ def command(
     from reachmap.tools.bin_scan import bin_scan, estimate_bin_scan, summary_of_bin
     from reachmap.tools.options import written_by
 
+    overrides = with_bin(overrides, bin_name)
     if attempts is not None:
         overrides = (*overrides, f"bin_scan.attempts={attempts}")
     if part is not None:

@@ -5,6 +5,7 @@ Option                Parameter of the command                Commands
 ====================  ======================================  =======================
 ``CELL``              ``cell: str``                           workspace-scan, check
 ``--cell``            ``cell: str | None``                    bin-scan, rank
+``--bin``             ``bin_name: str | None``                place-bin, bin-scan
 ``--set``             ``overrides: tuple[str, ...]``          all that read a cell
 ``--seed``            ``seed: int | None``                    scans, validate
 ``-j``, ``--workers`` ``workers: int``                        scans, place-bin
@@ -95,6 +96,19 @@ set_option = _option(
     help="Override one value of the cell, as in bin_scan.repeats=1. Repeatable; "
     "recorded in the result.",
 )
+
+bin_option = _option(
+    "--bin",
+    "bin_name",
+    metavar="NAME",
+    help="Which of the cell's bins it is about (bins); default: its pick_from.",
+)
+
+
+def with_bin(overrides: tuple[str, ...], name: str | None) -> tuple[str, ...]:
+    """Append to overrides the bin of ``--bin``, if one was given."""
+    return overrides if name is None else (*overrides, f"pick_from={name}")
+
 
 seed_option = _option(
     "--seed",

@@ -12,12 +12,14 @@ import click
 from reachmap.cli.options import (
     INPUT_FILE,
     OUTPUT_PATH,
+    bin_option,
     compose,
     output_option,
     run_options,
     seed_option,
     set_option,
     unused,
+    with_bin,
 )
 from reachmap.runtime.options import RunOptions
 
@@ -119,6 +121,7 @@ region_options = compose(
     metavar="PATH",
     help="Draw the decision there, too: .png or .svg.",
 )
+@bin_option
 @output_option("placement.h5")
 @set_option
 @seed_option
@@ -134,6 +137,7 @@ def command(
     tolerance: tuple[float, float] | None,
     keep_scan_configuration: bool,
     picture: Path | None,
+    bin_name: str | None,
     output: Path,
     overrides: tuple[str, ...],
     seed: int | None,
@@ -148,6 +152,9 @@ def command(
     bin-scan needs nothing else. The margin is how far the bin may be off before the
     score drops by 5 points.
 
+    Several bins are placed together, each beside the others, and each gets a file of
+    its own (placement-NAME.h5).
+
     Example: reachmap place-bin workspace.h5 --fix z=0 --region 0.2 0.8 -0.5 0.5
     """
     if bin_pose is not None:
@@ -155,21 +162,46 @@ def command(
             "rule", "fixed", "region", "heights", because="--bin-pose is not searched"
         )
     from reachmap.tools.place_bin import PlacementChoice, place_bin, placement_facts
+    from reachmap.tools.place_bins import bin_names, named_output, place_bins
 
     limits = {} if region is None else {"x": region[:2], "y": region[2:]}
+    choice = PlacementChoice(
+        rule=rule,
+        bin_pose=bin_pose,
+        limits=limits | ({} if heights is None else {"z": heights}),
+        fixed=fixed,
+        top=top,
+        tolerance=tolerance,
+        keep_scan_configuration=keep_scan_configuration,
+    )
+    if bin_name is None and len(bin_names(workspace)) > 1:
+        placements = place_bins(
+            workspace,
+            output,
+            choice=choice,
+            overrides=overrides,
+            seed=seed,
+            picture=picture,
+            run=run,
+        )
+        files = {name: named_output(output, name) for name in placements}
+        if as_json:
+            bins = {
+                name: {"output": str(files[name])} | placement_facts(placement)
+                for name, placement in placements.items()
+            }
+            click.echo(json.dumps({"bins": bins}))
+            return
+        for name, placement in placements.items():
+            click.echo(f"bin {name}")
+            for line in _lines(placement, files[name], top):
+                click.echo(line)
+        return
     placement = place_bin(
         workspace,
         output,
-        choice=PlacementChoice(
-            rule=rule,
-            bin_pose=bin_pose,
-            limits=limits | ({} if heights is None else {"z": heights}),
-            fixed=fixed,
-            top=top,
-            tolerance=tolerance,
-            keep_scan_configuration=keep_scan_configuration,
-        ),
-        overrides=overrides,
+        choice=choice,
+        overrides=with_bin(overrides, bin_name),
         seed=seed,
         picture=picture,
         run=run,

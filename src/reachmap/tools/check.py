@@ -184,14 +184,6 @@ def _joints(scene: Scene) -> tuple[JointRow, ...]:
     return tuple(rows)
 
 
-def _support(loaded: LoadedCell) -> str:
-    """What the bin stands on, or that it floats."""
-    cell = loaded.cell
-    T_world_bin = inverse_transform(cell.T_base_world()) @ cell.T_base_bin()
-    name = support_of(cell.bin, T_world_bin, top_faces(cell, np.eye(4)))
-    return name or "nothing (it floats)"
-
-
 def _bodies(loaded: LoadedCell) -> tuple[BodyRow, ...]:
     rows = [
         BodyRow(
@@ -202,18 +194,22 @@ def _bodies(loaded: LoadedCell) -> tuple[BodyRow, ...]:
         )
         for body in loaded.cell.bodies
     ]
-    tray = loaded.cell.bin
-    inner = " × ".join(f"{side:g}" for side in tray.inner)
-    walls = " and ".join(f"{wall:g}" for wall in dict.fromkeys(tray.walls))
-    carrier = f"{tray.carrier}, " if tray.carrier else ""
-    rows.append(
-        BodyRow(
-            name="bin",
-            attach_to=_support(loaded),
-            shape=f"{carrier}inside {inner} m, wall {walls} m",
-            touch=tray.touch,
+    T_world_base = inverse_transform(loaded.cell.T_base_world())
+    faces = top_faces(loaded.cell, np.eye(4))
+    for place, tray in loaded.cell.every_bin():
+        inner = " × ".join(f"{side:g}" for side in tray.inner)
+        walls = " and ".join(f"{wall:g}" for wall in dict.fromkeys(tray.walls))
+        carrier = f"{tray.carrier}, " if tray.carrier else ""
+        support = support_of(tray, T_world_base @ loaded.cell.T_base_of(tray), faces)
+        name = tray.name or place[-1]
+        rows.append(
+            BodyRow(
+                name="bin" if name == "bin" else f"bin {name}",
+                attach_to=support or "nothing (it floats)",
+                shape=f"{carrier}inside {inner} m, wall {walls} m",
+                touch=tray.touch,
+            )
         )
-    )
     return tuple(rows)
 
 

@@ -147,15 +147,60 @@ def place_bin(
         See :mod:`reachmap.errors`.
     """
     choice = choice or PlacementChoice()
-    _check(choice)
+    check_choice(choice)
     check_picture(picture, "--picture")
     check_outputs([output, picture], overwrite=run.overwrite, inputs=[workspace])
-    clock = RunClock(workers=run.workers)
     workspace_map = read_workspace_map(workspace)
     loaded = cell_of_artefact(
         workspace_map.provenance, str(workspace), with_seed(overrides, seed)
     )
     refuse_cell_files([output, picture], loaded)
+    placed = placed_bin(loaded, workspace_map, choice, run)
+    write_placement(output, placed.placement, overwrite=run.overwrite)
+    if picture is not None:
+        draw_placed(picture, placed, run)
+    return placed.placement
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PlacedBin:
+    """A placement with what it was decided on.
+
+    Attributes
+    ----------
+    placement : BinPlacement
+    workspace : WorkspaceMap
+        Upright.
+    question : Question
+    """
+
+    placement: BinPlacement
+    workspace: WorkspaceMap
+    question: Question
+
+
+def placed_bin(
+    loaded: LoadedCell,
+    workspace_map: WorkspaceMap,
+    choice: PlacementChoice,
+    run: RunOptions,
+) -> PlacedBin:
+    """Choose a place; nothing is written.
+
+    Parameters
+    ----------
+    loaded : LoadedCell
+        Other bins of it stand where it has them.
+    workspace_map : WorkspaceMap
+    choice : PlacementChoice
+    run : RunOptions
+
+    Raises
+    ------
+    SceneError
+        The bin can stand nowhere, or cannot be imaged.
+    """
+    clock = RunClock(workers=run.workers)
     workspace_map = upright_workspace(workspace_map, loaded.cell.T_base_level())
     region = _region(loaded, workspace_map, choice)
     scene = Scene.build(loaded, with_bin=False)
@@ -181,10 +226,7 @@ def place_bin(
             outcome = settle(question, decision)
         clock.add_cpu("workers", evaluator.cpu_s if run.workers > 1 else 0.0)
     placement = _record(question, decision, outcome, choice, clock)
-    write_placement(output, placement, overwrite=run.overwrite)
-    if picture is not None:
-        _draw(picture, placement, workspace_map, question, run)
-    return placement
+    return PlacedBin(placement=placement, workspace=workspace_map, question=question)
 
 
 def _question(
@@ -237,7 +279,7 @@ def _still_camera(scene: Scene) -> FloatArray | None:
     return None if camera.is_carried else camera.T_base_camera(scene.scan_configuration)
 
 
-def _check(choice: PlacementChoice) -> None:
+def check_choice(choice: PlacementChoice) -> None:
     """Refuse wrong settings before the work is done."""
     if choice.rule not in RULES:
         raise SettingsError(f"rule {choice.rule!r}: expected {' or '.join(RULES)}")
@@ -346,18 +388,14 @@ def _record(
     )
 
 
-def _draw(
-    path: Path,
-    placement: BinPlacement,
-    workspace: WorkspaceMap,
-    question: Question,
-    run: RunOptions,
-) -> None:
+def draw_placed(path: Path, placed: PlacedBin, run: RunOptions) -> None:
+    """Draw a placement to a .png or .svg file."""
     from reachmap.plots.parts.style import figure_bytes
     from reachmap.plots.placement import draw_placement
 
+    placement = placed.placement
     figure = draw_placement(
-        placement, workspace, camera_view=_camera_view(placement, question)
+        placement, placed.workspace, camera_view=_camera_view(placed)
     )
     data = figure_bytes(
         figure,
@@ -368,8 +406,9 @@ def _draw(
     publish(path, [data], overwrite=run.overwrite)
 
 
-def _camera_view(placement: BinPlacement, question: Question) -> FloatArray | None:
+def _camera_view(placed: PlacedBin) -> FloatArray | None:
     """What the camera sees at the height of the rim, shape (4, 2) [m]."""
+    placement, question = placed.placement, placed.question
     cell, scene = question.loaded.cell, question.scene
     if cell.camera is None:
         return None

@@ -7,7 +7,7 @@ each other are a pair, but for links that a joint joins and for pairs that may t
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -87,13 +87,8 @@ def _parts_of(loaded: LoadedCell, spec: BinSpec, label: str) -> tuple[BinPart, .
 
 def bin_placements(robot: RobotModel, loaded: LoadedCell) -> dict[str, FloatArray]:
     """Poses (4, 4) of the bin's parts in the model's root frame, by name."""
-    T_root_bin = robot.T_root_base @ loaded.cell.T_base_bin()
-    return {
-        part.name: np.asarray(
-            T_root_bin @ transform_from_parts(np.eye(3), part.centre_m)
-        )
-        for part in parts_of_bin(loaded)
-    }
+    spec = loaded.cell.bin
+    return {part.name: T for part, T in _placed_parts(robot, loaded, spec, "bin")}
 
 
 Load = Literal["empty", "lifted", "carried"]
@@ -106,7 +101,22 @@ def world_placements(robot: RobotModel, loaded: LoadedCell) -> dict[str, FloatAr
         body.name: np.asarray(robot.T_root_world @ body.pose.matrix())
         for body in loaded.cell.bodies
         if body.attach_to == "world"
+    } | {
+        f"{name} {part.name}": T
+        for name, spec in loaded.cell.bins.items()
+        if spec.frame == "world"
+        for part, T in _placed_parts(robot, loaded, spec, f"bin {name}")
     }
+
+
+def _placed_parts(
+    robot: RobotModel, loaded: LoadedCell, spec: BinSpec, label: str
+) -> Iterator[tuple[BinPart, FloatArray]]:
+    """Parts of one of the bins with their poses (4, 4) in the root frame."""
+    T_root_bin = robot.T_root_base @ loaded.cell.T_base_of(spec)
+    for part in _parts_of(loaded, spec, label):
+        T_bin_part = transform_from_parts(np.eye(3), part.centre_m)
+        yield part, np.asarray(T_root_bin @ T_bin_part)
 
 
 def world_shapes(loaded: LoadedCell) -> dict[str, Any]:
@@ -153,9 +163,7 @@ def build_geometry(
         for part in parts_of_bin(loaded):
             builder.add(part.name, ROOT, placements[part.name], part.shape)
     for name, spec in loaded.cell.bins.items():
-        T_root_bin = robot.T_root_base @ loaded.cell.T_base_of(spec)
-        for part in _parts_of(loaded, spec, f"bin {name}"):
-            T = T_root_bin @ transform_from_parts(np.eye(3), part.centre_m)
+        for part, T in _placed_parts(robot, loaded, spec, f"bin {name}"):
             builder.add(f"{name} {part.name}", ROOT, T, part.shape)
     touches = [(body.name, body.touch) for body in loaded.cell.bodies]
     touches += [(name, spec.touch) for name, spec in loaded.cell.bins.items()]

@@ -1,0 +1,173 @@
+"""Several bins in one cell: what a file says, what is loaded, and what stands where."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from reachmap.cell.loading import cell_from_json, read_cell
+from reachmap.core.scene import Scene
+from reachmap.errors import CellError
+
+TRAY = (
+    "{inner: [0.30, 0.20, 0.05], wall: 0.006, pose: {xyz: [%s], rpy_deg: [0, 0, 90]}}"
+)
+LEFT, RIGHT = TRAY % "0.45, 0.18, -0.05", TRAY % "0.45, -0.18, -0.05"
+
+
+def write(folder, bins):
+    """The shipped UR5 cell with other bins."""
+    text = (read_cell("ur5-eye-in-hand").text).split("\nbin:")
+    rest = text[1].split("\nscan_configuration:")[1]
+    path = folder / "cell.yaml"
+    path.write_text(f"{text[0]}\n{bins}\nscan_configuration:{rest}")
+    return str(path)
+
+
+@pytest.fixture
+def two(tmp_path):
+    """A cell with a left and a right bin."""
+    return write(tmp_path, f"bins:\n  left: {LEFT}\n  right: {RIGHT}")
+
+
+def test_the_first_is_picked_from_unless_told(two):
+    """`pick_from` changes which one is the bin; the other stays."""
+    cell = read_cell(two).cell
+    assert (cell.bin.name, [*cell.bins]) == ("left", ["right"])
+    cell = read_cell(two, ["pick_from=right"]).cell
+    assert (cell.bin.name, [*cell.bins]) == ("right", ["left"])
+    assert cell.T_base_bin()[1, 3] == pytest.approx(-0.18)
+
+
+def test_a_single_bin_has_the_hash_it_had(tmp_path):
+    """One bin by name is the same cell as one without."""
+    single = write(tmp_path, f"bin: {LEFT}")
+    plain = read_cell(single)
+    assert plain.sha256 == read_cell(write(tmp_path, f"bins: {{a: {LEFT}}}")).sha256
+    text = plain.cell.model_dump(mode="json")
+    assert text["bins"] == {}
+    assert text["bin"]["name"] is None
+
+
+def test_a_stored_cell_can_change_its_bin(two):
+    """What an artefact keeps is picked from elsewhere, and changed by name."""
+    loaded = read_cell(two)
+
+    def changed(*changes):
+        return cell_from_json(
+            loaded.resolved_json,
+            urdf=loaded.urdf,
+            srdf=loaded.srdf,
+            changes=changes,
+            files_sha256=loaded.files_sha256,
+        )
+
+    assert changed().sha256 == loaded.sha256
+    assert (
+        changed("pick_from=right").sha256 == read_cell(two, ["pick_from=right"]).sha256
+    )
+    for name in ("left", "right"):
+        moved = changed(f"bins.{name}.pose.xyz.2=0.1")
+        heights = {s.name or "right": s.pose.xyz[2] for _, s in moved.cell.every_bin()}
+        assert heights[name] == 0.1
+        assert sorted(heights.values()) == [-0.05, 0.1]
+
+
+def test_every_bin_is_an_obstacle(two):
+    """The parts of the other bin are bodies, and the arm meets them."""
+    scene = Scene.build(read_cell(two))
+    names = {name.split(" | ")[1] for name in scene.checker.body_pairs}
+    assert {"bin wall +x", "right bin wall +x"} <= names
+    bodies = scene.checker.bodies.geometryObjects
+    y = [b.placement.translation[1] for b in bodies if "right bin bottom" in b.name]
+    assert y == pytest.approx([-0.18])
+    bare = Scene.build(read_cell(two), with_bin=False)
+    assert not any("bin" in name for name in bare.checker.body_pairs)
+
+
+def test_a_touch_of_a_bin_is_of_all_or_of_one(two):
+    """`bin` stands for every bin, a name for its own."""
+    left, both = (
+        Scene.build(
+            read_cell(two, [f"bodies.suction tube.touch=[wrist_3_link, {name}]"])
+        )
+        for name in ("right", "bin")
+    )
+
+    def pairs(scene):
+        return [p for p in scene.checker.body_pairs if p.startswith("suction tube |")]
+
+    assert any("| bin wall" in pair for pair in pairs(left))
+    assert not any("right bin" in pair for pair in pairs(left))
+    assert not any("bin " in pair for pair in pairs(both))
+
+
+def test_bins_that_meet_are_named(two):
+    """Both of them, and the key of the one that is picked from."""
+    scene = Scene.build(read_cell(two, ["bins.right.pose.xyz.1=0.1"]))
+    problems = scene.scan_problems()
+    assert any(
+        text.startswith("bins.left.pose: bin") and "right bin" in text
+        for text in problems
+    )
+
+
+def test_carriers_and_supports_are_of_each(tmp_path):
+    """`carrier` and `on` work in every bin."""
+    table = "{name: table, shape: {box: [0.8, 1.2, 0.1]}, pose: {xyz: [0.5, 0, -0.4]}}"
+    bins = (
+        "bins:\n  a: {carrier: KLT-3147, on: table, pose: {xyz: [0.5, 0.2, 0]}}\n"
+        "  b: {carrier: KLT-4147, on: table, pose: {xyz: [0.5, -0.2, 0]}}"
+    )
+    cell = read_cell(write(tmp_path, bins), [f"bodies=[{table}]"]).cell
+    for name, spec in (("a", cell.bin), ("b", cell.bins["b"])):
+        bottom = cell.T_base_of(spec)[2, 3] - spec.bottom_m
+        T_base_world = cell.T_base_world()
+        assert bottom == pytest.approx(-0.35 + T_base_world[2, 3]), name
+    assert cell.bins["b"].inner == (0.346, 0.265, 0.1325)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ("pick_from=rigt", "pick_from: no bin 'rigt'; did you mean 'right'"),
+        ("bins.left.carrier=KLT-99", "bins.left.carrier: no carrier 'KLT-99'"),
+        ("bins.right.carrier=KLT-99", "bins.right.carrier: no carrier 'KLT-99'"),
+        ("bins.left.inner=[1, 2]", "bins.left.inner.2: a value is missing"),
+        ("bins.right.inner=[1, 2]", "bins.right.inner.2: a value is missing"),
+        ("bins.left.on=shelf", "bins.left.on: 'shelf' is no body"),
+        ("bins.right.on=shelf", "bins.right.on: 'shelf' is no body"),
+        ("bins.left.pose.rpy_deg=[90, 0, 0]", "bins.left.pose: the bin stands 90 deg"),
+        ("bins.right.pose.rpy_deg=[90, 0, 0]", "bins.right.pose: the bin stands 90"),
+        ("bins.left.touch=[shelf]", "bins.left.touch.0: no link or body 'shelf'"),
+        ("bin.wall=0.1", "bin: give bin or bins, not both"),
+        ("bins.left.name=other", "bins.left.name: the name of a bin is its key"),
+    ],
+)
+def test_mistakes_name_the_bin(two, change, message):
+    """As it is written in the file, whichever is picked from."""
+    with pytest.raises(CellError, match=message.replace("[", r"\[")):
+        read_cell(two, [change])
+
+
+def test_names_must_be_free(tmp_path):
+    """A bin is not called like a body."""
+    path = write(tmp_path, f"bins:\n  floor: {LEFT}\n  pedestal: {RIGHT}")
+    with pytest.raises(CellError, match="'floor' is the name of") as caught:
+        read_cell(path)
+    assert any("'pedestal' is the name of" in line for line in caught.value.lines)
+
+
+def test_a_cell_without_names_has_none_to_choose():
+    """`pick_from` needs bins."""
+    with pytest.raises(CellError, match="no bins by name"):
+        read_cell("ur5-eye-in-hand", ["pick_from=left"])
+
+
+def test_other_bins_can_be_taken_away(two):
+    """The cell alone has the hash of a cell with that bin only."""
+    loaded = read_cell(two)
+    alone = loaded.with_other_bins({})
+    assert alone.sha256 != loaded.sha256
+    assert loaded.with_other_bins(loaded.cell.bins) is loaded
+    assert np.allclose(alone.cell.T_base_bin(), loaded.cell.T_base_bin())
