@@ -94,8 +94,8 @@ def place_bins(
     choice = choice or PlacementChoice()
     check_choice(choice)
     names = bin_names(workspace)
-    if choice.bin_pose is not None or choice.fixed:
-        raise SettingsError("a pose is one bin's: name it (--bin NAME)")
+    if choice.bin_pose is not None:
+        raise SettingsError("--bin-pose is of one bin: name it (--bin NAME)")
     files = {name: named_output(output, name) for name in names}
     pictures = {
         name: None if picture is None else named_output(picture, name) for name in names
