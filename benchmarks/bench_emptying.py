@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from reachmap._typing import FloatArray
-from reachmap.cell.loading import LoadedCell, cell_from_json
+from reachmap.cell.loading import LoadedCell
 from reachmap.core.scene import Scene
 from reachmap.geometry import AXES
 from reachmap.maps import BinMap, read_bin_map
@@ -27,24 +27,9 @@ from reachmap.ranking.lookup.ranker import Ranker
 from reachmap.sampling.frames import approach_distance_m
 from reachmap.scans.ik_survey import survey_frames
 from reachmap.tools.empty import FILL, part_costs
+from reachmap.tools.options import cell_of_artefact
 
 SEED = 100
-
-
-def at_height(record: BinMap, height: float) -> LoadedCell:
-    """The map's cell with its bin filled up to a height, and a single test point."""
-    kept = record.provenance
-    loaded = cell_from_json(
-        kept.cell_resolved_json,
-        urdf=kept.urdf,
-        srdf=kept.srdf,
-        changes=[
-            "bin_scan.fill=null",
-            f"bin_scan.fill_heights_m=[{height:.6f}]",
-            "bin_scan.grid=[1,1]",
-        ],
-    )
-    return loaded.filled_to(0)
 
 
 def poses_of(record: BinMap, heap: Heap, part: int, rolls: int) -> FloatArray:
@@ -65,10 +50,11 @@ def poses_of(record: BinMap, heap: Heap, part: int, rolls: int) -> FloatArray:
     return T
 
 
-def planned_cost(record: BinMap, heap: Heap, part: int, rolls: int) -> float:
+def planned_cost(
+    record: BinMap, loaded: LoadedCell, heap: Heap, part: int, rolls: int
+) -> float:
     """0 where the planner reaches a part at one of its rolls, else infinite."""
-    height = min(float(heap.position[part, 2]), float(record.bin_inner[2]))
-    scene = Scene.build(at_height(record, height))
+    scene = Scene.build(loaded.filled_up_to(float(heap.position[part, 2])))
     survey = survey_frames(
         scene,
         poses_of(record, heap, part, rolls),
@@ -86,7 +72,8 @@ def main() -> None:
     heaps = int(sys.argv[2]) if len(sys.argv) > 2 else 3
     sides = sys.argv[3] if len(sys.argv) > 3 else "80x60x40"
     x, y, z = (float(side) / 1e3 for side in sides.split("x"))
-    cell = at_height(record, 0.0).cell
+    loaded = cell_of_artefact(record.provenance, sys.argv[1])
+    cell = loaded.cell
     rings = cell.bin_scan.orientations.rings()
     rolls = max(ring.rolls for ring in rings)
     ranker, gaps = Ranker(record), []
@@ -94,7 +81,10 @@ def main() -> None:
         heap = drop_heap(cell.bin, (x, y, z), FILL, SEED + number)
         told, _ = part_costs(ranker, record, heap)
         done = np.array(
-            [planned_cost(record, heap, part, rolls) for part in range(len(heap))]
+            [
+                planned_cost(record, loaded, heap, part, rolls)
+                for part in range(len(heap))
+            ]
         )
         left = [
             100.0 * float((empty_heap(heap, cost).fate != Fate.PICKED).mean())

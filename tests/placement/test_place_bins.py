@@ -21,8 +21,10 @@ CUBE = (
     '"grid":[7,7]}]'
 )
 # In one level the bins cannot stand above each other.
-WHERE = ("--fix", "z=-0.2", "--region", "-0.5", "0.5", "0.1", "0.6", "--top", "2")
-WHERE += ("--tolerance", "0.01", "2", "-j", "1", "--no-progress")
+WHERE = (
+    *("--fix", "z=-0.2", "--region", "-0.5", "0.5", "0.1", "0.6", "--top", "2"),
+    *("--tolerance", "0.01", "2", "-j", "1", "--no-progress"),
+)
 
 
 def run(*arguments):

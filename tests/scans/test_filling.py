@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -15,6 +17,8 @@ from reachmap.sampling.frames import bin_test_frames
 from reachmap.tools.bin_scan import bin_scan
 from reachmap.tools.merge import merge
 from reachmap.tools.options import RunOptions
+from reachmap.validation.picks import NO_PICKS
+from reachmap.validation.planning import PickContext
 
 DEEP = (
     "bin.carrier=KLT-6147",
@@ -141,3 +145,19 @@ def test_levels_that_no_bin_can_have_are_refused(overrides, message):
     """With the key to blame."""
     with pytest.raises(CellError, match=message):
         read_cell("planar-toy", overrides)
+
+
+def test_a_grasp_is_planned_to_in_a_bin_filled_up_to_it():
+    """The heap ends a cup's stroke below the grasp, whatever the layers."""
+    loaded = read_cell("ur10-deep-container")
+    T = loaded.cell.T_base_bin()
+    heights = [0.005, 0.1, 0.2, 0.4]
+    picks = dataclasses.replace(
+        NO_PICKS, points=np.array([(T @ [0.1, 0.05, z, 1.0])[:3] for z in heights])
+    )
+    context = PickContext(loaded=loaded, picks=picks, rolls=1, repeats=1, seed=1)
+    heaps = [context.cell_for(k).cell.bin.heap for k in range(4)]
+    assert heaps == pytest.approx([0.0, 0.09, 0.19, 0.255])
+    empty = read_cell("ur10-deep-container", ["bin_scan.fill=null"])
+    context = dataclasses.replace(context, loaded=empty)
+    assert context.cell_for(2) is empty

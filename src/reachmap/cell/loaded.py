@@ -152,9 +152,17 @@ class LoadedCell:
 
     def filled_to(self, layer: int) -> LoadedCell:
         """The cell with its bin filled to one of the layers, the only one left."""
+        return self.filled_up_to(self.cell.bin_scan.layers[layer])
+
+    def filled_up_to(self, height_m: float) -> LoadedCell:
+        """The cell with its bin filled up to a height, which is its only layer.
+
+        Where its layers are not levels of a filling, no parts are added.
+        """
         cell, spec = self.cell, self.cell.bin_scan
-        heap = max(spec.heap_m(layer), cell.bin.heap)
-        levels = {"layers": (spec.layers[layer],), "fill": None, "fill_heights_m": None}
+        height_m = min(max(height_m, 0.0), cell.bin.inner[2])
+        heap = max(spec.heap_below_m(height_m), cell.bin.heap)
+        levels = {"layers": (height_m,), "fill": None, "fill_heights_m": None}
         changed = cell.model_copy(
             update={
                 "bin": cell.bin.model_copy(update={"heap": heap}),

@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 
-from reachmap.core.scene import Scene
 from reachmap.errors import GraspListError, SettingsError
 from reachmap.maps import read_bin_map
 from reachmap.maps.bytes.publish import check_outputs, check_picture, publish
@@ -26,6 +25,7 @@ from reachmap.ranking.lookup.settings import CostBasis, RankSettings
 from reachmap.runtime.options import IN_PROCESS, RunOptions
 from reachmap.runtime.progress import Progress
 from reachmap.sampling.frames import approach_distance_m
+from reachmap.scans.bin_scan import pairs_of_fillings
 from reachmap.tools.options import cell_of_artefact
 from reachmap.tools.prologue import refuse_cell_files
 from reachmap.tools.rank import ListFormat, ranker_of, read_list
@@ -39,7 +39,6 @@ from reachmap.validation.summary import Validation, summarise
 
 DEFAULT_ROLLS = 24
 MAX_ROLLS, MAX_REPEATS = 360, 255
-
 
 logger = logging.getLogger(__name__)
 
@@ -149,13 +148,7 @@ def validate(
     context = replace(context, picks=join_picks([picks_of(one) for one in ranked]))
     if not len(context.picks):
         raise GraspListError("there are no grasps to plan to")
-    scene = Scene.shared(context.loaded, with_bin=True)
-    scene.require_free_scan_configuration()
-    if context.loaded.cell.bin_scan.is_filled:
-        logger.warning(
-            "%s: scanned at levels of filling; grasps are planned to in the empty bin",
-            map_path,
-        )
+    context = replace(context, body_pairs=tuple(pairs_of_fillings(context.loaded)))
     results = plan_picks(context, run, progress=Progress("validate", quiet=run.quiet))
     validation = summarise(
         [
@@ -172,7 +165,7 @@ def validate(
     )
     if calibration is not None:
         _calibrate(validation, calibration, overwrite=run.overwrite)
-    _write(validation, output, chart, scene.checker.body_pairs, run.overwrite)
+    _write(validation, output, chart, context.body_pairs, run.overwrite)
     return ValidateAnswer(
         validation=validation,
         facts=facts_of(validation),

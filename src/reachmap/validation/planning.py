@@ -13,6 +13,7 @@ from reachmap._typing import CodeArray, FloatArray, IntArray
 from reachmap.core.kinematics.windings import Windings
 from reachmap.core.planning.planner import PlanResult
 from reachmap.core.scene import Scene
+from reachmap.geometry import inverse_transform
 from reachmap.maps.records import NO_PAIR, Status, freeze
 from reachmap.runtime.job import Job
 from reachmap.runtime.options import RunOptions
@@ -32,13 +33,27 @@ FURTHEST = (Status.APPROACH_BLOCKED, Status.IK_IN_COLLISION, Status.NO_IK)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PickContext:
-    """What a worker needs: the cell with its bin, the grasps, how hard to try."""
+    """What a worker needs: the cell with its bin, the grasps, how hard to try.
+
+    Of a cell that is scanned at levels of filling, the bin is filled up to each grasp.
+    ``body_pairs`` are those that blocking pairs are numbered in.
+    """
 
     loaded: LoadedCell
     picks: Picks
     rolls: int
     repeats: int
     seed: int
+    body_pairs: tuple[str, ...] = ()
+
+    def cell_for(self, pick: int) -> LoadedCell:
+        """The cell as a grasp finds it."""
+        cell = self.loaded.cell
+        if not cell.bin_scan.is_filled:
+            return self.loaded
+        T_bin_base = inverse_transform(cell.T_base_bin())
+        height = T_bin_base[2, :3] @ self.picks.points[pick] + T_bin_base[2, 3]
+        return self.loaded.filled_up_to(float(height))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -91,7 +106,7 @@ def plan_picks(
     context: PickContext, options: RunOptions, *, progress: Progress
 ) -> PickResults:
     """Plan to every grasp; verdicts do not depend on the number of workers."""
-    job = Job(function=plan_unit, prepare=prepare, context=context)
+    job = Job(function=plan_unit, context=context)
     payloads = run(job, range(len(context.picks)), options, progress)
     return PickResults(
         **{
@@ -101,14 +116,9 @@ def plan_picks(
     )
 
 
-def prepare(context: PickContext) -> tuple[PickContext, Scene]:
-    """Build the scene, once per worker."""
-    return context, Scene.shared(context.loaded, with_bin=True)
-
-
-def plan_unit(state: tuple[PickContext, Scene], pick: int) -> dict[str, Any]:
+def plan_unit(context: PickContext, pick: int) -> dict[str, Any]:
     """Plan to one grasp."""
-    context, scene = state
+    scene = Scene.shared(context.cell_for(pick), with_bin=True)
     T = tool_poses(
         context.picks,
         pick,
@@ -117,7 +127,15 @@ def plan_unit(state: tuple[PickContext, Scene], pick: int) -> dict[str, Any]:
     )
     key = (context.seed, int(context.picks.number[pick]))
     results = plan_pick(scene, T, key, context.repeats)
-    return dataclasses.asdict(results)
+    number = {name: k for k, name in enumerate(context.body_pairs)}
+    names = scene.checker.body_pairs
+    pairs = [
+        number.get(names[k], NO_PAIR) if k >= 0 else NO_PAIR
+        for k in results.blocking_pair.tolist()
+    ]
+    return dataclasses.asdict(
+        dataclasses.replace(results, blocking_pair=np.array(pairs))
+    )
 
 
 def plan_pick(

@@ -59,7 +59,7 @@ class App:
         self.answer: Answer | None = None
         self.path = path
         self._rows: list[int] = []
-        self._scene: Scene | None = None
+        self._scenes: dict[str, Scene] = {}
         self._balls: Any = None
         self._way: Any = None
         self._busy = threading.Lock()
@@ -184,9 +184,11 @@ class App:
         self._stop.set()
         with self._busy:
             row = self._rows[min(number, len(self._rows) - 1)]
-            shown = answer(
-                self.points, row, getattr(self.record, "body_pairs", ()), self._solver()
-            )
+            frames = self.points.frames
+            assert frames is not None
+            level = int(self.points.level[frames.point[row]])
+            pairs = getattr(self.record, "body_pairs", ())
+            shown = answer(self.points, row, pairs, self._solver(level))
             self.answer = shown
             self._put_way(None)
             self.stage.put_axes(shown.T_base_tcp)
@@ -246,16 +248,20 @@ class App:
             tcp = np.array([self.cell.tcp_pose(q)[:3, 3] for q in there])
             self._way = self.stage.put_way(tcp, name="/way")
 
-    def _solver(self) -> Scene | None:
-        """Scene that finds colliding configurations again; built when first needed."""
-        if self._scene is None:
+    def _solver(self, level: int) -> Scene | None:
+        """Scene that finds colliding configurations again; built when first needed.
+
+        Of a map with levels of filling it is that of the level.
+        """
+        fillings = self.cell.loaded.fillings() if has_bin(self.record) else ()
+        loaded = fillings[level] if len(fillings) > 1 else self.cell.loaded
+        if loaded.sha256 not in self._scenes:
             try:
-                self._scene = Scene.build(
-                    self.cell.loaded, with_bin=has_bin(self.record)
-                )
+                found = Scene.build(loaded, with_bin=has_bin(self.record))
             except ReachmapError:
                 return None
-        return self._scene
+            self._scenes[loaded.sha256] = found
+        return self._scenes[loaded.sha256]
 
 
 def _place(position: FloatArray) -> str:

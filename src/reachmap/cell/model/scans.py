@@ -156,11 +156,11 @@ class BinScanSpec(Record):
         """Whether each layer is the surface of parts that fill the bin below it."""
         return self.fill is not None or self.fill_heights_m is not None
 
-    def heap_m(self, layer: int) -> float:
-        """Height of the obstacle below a layer [m]."""
+    def heap_below_m(self, height_m: float) -> float:
+        """Height of the obstacle below parts at a height [m]."""
         if not self.is_filled:
             return 0.0
-        return max(round(self.layers[layer] - self.press_in_m, 9), 0.0)
+        return max(round(height_m - self.press_in_m, 9), 0.0)
 
     def count(self) -> int:
         """Count the test grasps."""
