@@ -14,12 +14,8 @@ from reachmap.cli.options import (
     OUTPUT_PATH,
     Decorator,
     into_run,
-    json_option,
     output_option,
-    overwrite_option,
-    progress_option,
     seed_option,
-    workers_option,
 )
 from reachmap.cli.quantities import ERROR_SIZE, QuantityCommand
 from reachmap.runtime.options import RunOptions

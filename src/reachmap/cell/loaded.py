@@ -137,7 +137,7 @@ class LoadedCell:
         """Copy with other bins beside its own."""
         if self.cell.bins == bins:
             return self
-        return self._with_cell(self.cell.model_copy(update={"bins": dict(bins)}))
+        return self.with_cell(self.cell.model_copy(update={"bins": dict(bins)}))
 
     def fillings(self) -> tuple[LoadedCell, ...]:
         """The cell for each level of the parts in its bin, which has no other layer.
