@@ -13,7 +13,6 @@ from reachmap.cli.options import (
     INPUT_FILE,
     OUTPUT_PATH,
     Decorator,
-    into_run,
     output_option,
     seed_option,
 )
@@ -65,11 +64,7 @@ def _size_option(name: str, help: str) -> Decorator[Any]:
     help="Draw the curve there, too (.png or .svg).",
 )
 @seed_option
-@workers_option
-@overwrite_option
-@progress_option
-@json_option
-@into_run
+@run_options
 def command(
     bin_map: Path,
     bin_size: tuple[float, float],
