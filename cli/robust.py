@@ -14,6 +14,7 @@ from reachmap.cli.options import (
     OUTPUT_PATH,
     Decorator,
     output_option,
+    run_options,
     seed_option,
 )
 from reachmap.cli.quantities import ERROR_SIZE, QuantityCommand
