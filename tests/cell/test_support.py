@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from reachmap.cell.bins.support import TopFace, footprint_of_bin, support_of, top_faces
 from reachmap.cell.loading import read_cell
-from reachmap.cell.support import TopFace, footprint_of_bin, support_of, top_faces
 from reachmap.errors import CellError
 from reachmap.geometry import yaw_transform
 

@@ -7,10 +7,12 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from reachmap.cell.carriers import write_out_carriers
+from reachmap.cell.bins.carriers import write_out_carriers
+from reachmap.cell.bins.filling import write_out_fill
+from reachmap.cell.bins.names import gather_bins, write_out_bins
+from reachmap.cell.bins.support import stood_on_supports
 from reachmap.cell.files.files import compare_hashes, read_files, stored_files
 from reachmap.cell.files.resources import shipped_folder
-from reachmap.cell.filling import write_out_fill
 from reachmap.cell.loaded import LoadedCell, fingerprint
 from reachmap.cell.model.cell import Cell
 from reachmap.cell.mounting import (
@@ -21,8 +23,6 @@ from reachmap.cell.mounting import (
 from reachmap.cell.pick_cycle import check_part_choice
 from reachmap.cell.references import check_names, find_doubts
 from reachmap.cell.resolution import resolved_cell, validated
-from reachmap.cell.several_bins import gather_bins, write_out_bins
-from reachmap.cell.support import stood_on_supports
 from reachmap.cell.text.expressions import resolve_expressions, restore_expressions
 from reachmap.cell.text.messages import did_you_mean
 from reachmap.cell.text.overrides import apply_overrides

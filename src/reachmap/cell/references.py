@@ -10,6 +10,7 @@ import difflib
 from collections.abc import Collection
 from typing import Any
 
+from reachmap.cell.bins.names import bin_places
 from reachmap.cell.files.collisions import mesh_scales
 from reachmap.cell.files.files import CellFiles, body_key
 from reachmap.cell.files.srdf import SrdfDescription
@@ -18,7 +19,6 @@ from reachmap.cell.model.cell import Cell
 from reachmap.cell.model.fields import MAX_LENGTH_M
 from reachmap.cell.model.shapes import sides
 from reachmap.cell.pick_cycle import check_cycle_names, joint_value_places
-from reachmap.cell.several_bins import bin_places
 from reachmap.cell.text.data import at, entries, text_at
 from reachmap.cell.text.messages import did_you_mean
 from reachmap.cell.text.yaml_reader import Document, Location

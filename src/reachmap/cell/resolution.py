@@ -9,6 +9,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from reachmap.cell.bins.support import stood_on_supports
 from reachmap.cell.files.files import CellFiles
 from reachmap.cell.files.joint_limits import tighten_limits
 from reachmap.cell.files.resources import SCHEME, SHIPPED, Resolver, shipped_folder
@@ -16,7 +17,6 @@ from reachmap.cell.model.cell import Cell
 from reachmap.cell.mounting import check_bins_stand, write_out_base_pose
 from reachmap.cell.pick_cycle import joint_value_places
 from reachmap.cell.references import moving_joints
-from reachmap.cell.support import stood_on_supports
 from reachmap.cell.text.data import at
 from reachmap.cell.text.messages import add_validation_errors
 from reachmap.cell.text.yaml_reader import Document

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from reachmap._typing import BoolArray, FloatArray
-from reachmap.cell.support import (
+from reachmap.cell.bins.support import (
     SLACK_M,
     TopFace,
     footprint_of_bin,

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from reachmap.cell.bins.support import SLACK_M, TopFace, footprint_of_bin
 from reachmap.cell.model.cell import Cell
-from reachmap.cell.support import SLACK_M, TopFace, footprint_of_bin
 from reachmap.core.collision.bin_fit import BinFit
 from reachmap.errors import SettingsError
 from reachmap.geometry import yaw_transform

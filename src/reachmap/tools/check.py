@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from reachmap._typing import FloatArray
+from reachmap.cell.bins.support import support_of, top_faces
 from reachmap.cell.loading import LoadedCell, read_cell
 from reachmap.cell.model.shapes import shape_text
-from reachmap.cell.support import support_of, top_faces
 from reachmap.core.scene import Scene
 from reachmap.geometry import AXES, inverse_transform, tilt_rad
 from reachmap.placement.mapped.imaging import picture_of

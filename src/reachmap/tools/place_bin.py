@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from reachmap._typing import BoolArray, FloatArray
+from reachmap.cell.bins.support import TopFace, top_faces
 from reachmap.cell.model.tool import LISTED
-from reachmap.cell.support import TopFace, top_faces
 from reachmap.core.collision.bin_fit import BinFit
 from reachmap.core.collision.camera import Camera
 from reachmap.core.scene import Scene
@@ -23,7 +23,6 @@ from reachmap.maps import (
     RunClock,
     WorkspaceMap,
     check_outputs,
-    publish,
     read_workspace_map,
     write_placement,
 )
@@ -42,7 +41,6 @@ from reachmap.placement.mapped.evaluator import Evaluator, open_evaluator
 from reachmap.placement.mapped.exact import Pose
 from reachmap.placement.mapped.imaging import can_choose
 from reachmap.placement.mapped.sample import open_frames
-from reachmap.placement.mapped.viewpoints import picture_corners
 from reachmap.placement.predicted.region import AXES, Region, region_of
 from reachmap.placement.problem import Question
 from reachmap.placement.search import decide_by_search
@@ -59,6 +57,7 @@ from reachmap.scans.document import (
     scan_document,
 )
 from reachmap.tools.options import cell_of_artefact, with_seed
+from reachmap.tools.placement_picture import draw_placed
 from reachmap.tools.prologue import refuse_cell_files
 
 if TYPE_CHECKING:
@@ -386,34 +385,3 @@ def _record(
         provenance=provenance_from_document(document),
         run=clock.finish(),
     )
-
-
-def draw_placed(path: Path, placed: PlacedBin, run: RunOptions) -> None:
-    """Draw a placement to a .png or .svg file."""
-    from reachmap.plots.parts.style import figure_bytes
-    from reachmap.plots.placement import draw_placement
-
-    placement = placed.placement
-    figure = draw_placement(
-        placement, placed.workspace, camera_view=_camera_view(placed)
-    )
-    data = figure_bytes(
-        figure,
-        "svg" if path.suffix == ".svg" else "png",
-        title="Where the bin goes",
-        config_sha256=placement.stamp.config_sha256,
-    )
-    publish(path, [data], overwrite=run.overwrite)
-
-
-def _camera_view(placed: PlacedBin) -> FloatArray | None:
-    """What the camera sees at the height of the rim, shape (4, 2) [m]."""
-    placement, question = placed.placement, placed.question
-    cell, scene = question.loaded.cell, question.scene
-    if cell.camera is None:
-        return None
-    camera = Camera(scene.robot, question.loaded)
-    T_base_camera = camera.T_base_camera(placement.scan_configuration)
-    T_level_camera = inverse_transform(placement.T_base_level) @ T_base_camera
-    rim = float(placement.candidate_pose[placement.chosen, 2]) + cell.bin.inner[2]
-    return picture_corners(T_level_camera, cell.camera, rim)

@@ -26,9 +26,9 @@ from reachmap.tools.place_bin import (
     PlacedBin,
     PlacementChoice,
     check_choice,
-    draw_placed,
     placed_bin,
 )
+from reachmap.tools.placement_picture import draw_placed
 from reachmap.tools.prologue import refuse_cell_files
 
 if TYPE_CHECKING:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from reachmap._typing import FloatArray
+from reachmap.cell.bins.names import bin_places
 from reachmap.cell.files.collisions import mesh_scales
 from reachmap.cell.files.joint_limits import MoveItLimits, parse_joint_limits
 from reachmap.cell.files.resources import NotFoundError, Resolver
@@ -18,7 +19,6 @@ from reachmap.cell.files.xacro import Expansion
 from reachmap.cell.meshes.reading import MeshError, read_mesh
 from reachmap.cell.model.shapes import sides
 from reachmap.cell.pick_cycle import part_places
-from reachmap.cell.several_bins import bin_places
 from reachmap.cell.text.data import at, entries, text_at
 from reachmap.cell.text.messages import did_you_mean
 from reachmap.cell.text.yaml_reader import (

@@ -1,0 +1,1 @@
+"""Bins of a cell: carriers, filling, names, and what they stand on."""
