@@ -51,6 +51,13 @@ OBJECTIVES = (
     help="N samples of the ranges (NAME=LOW:HIGH) instead of every combination.",
 )
 @click.option(
+    "--optimise",
+    type=click.IntRange(min=2),
+    metavar="N",
+    help="Let an optimiser propose N variants, of values, NAME=LOW:HIGH:N or "
+    "NAME=LOW:HIGH, each from what those before were worth.",
+)
+@click.option(
     "--place/--keep-bin",
     default=False,
     show_default=True,

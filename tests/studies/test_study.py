@@ -235,3 +235,35 @@ def test_the_commands_read_a_study(tmp_path: Path) -> None:
     none = reachmap(tmp_path, *arguments, "-o", "s.h5", "--require", "level_average>99")
     assert none.returncode == 1
     assert "no variant meets level_average > 99" in none.stderr
+
+
+def test_an_optimised_study_is_the_same_when_it_is_resumed(tmp_path: Path) -> None:
+    """Rounds that were done are not done again; the cell as it is comes first."""
+    output = tmp_path / "study.h5"
+
+    def optimised(count: int) -> Study:
+        return study(
+            "planar-toy",
+            output,
+            vary=[f"{RADIUS}=0.01,0.02,0.035", "bin.pose.xyz.0=0.1:0.3:5"],
+            optimise=count,
+            objectives=["bin_reachability"],
+            overrides=SMALL,
+            run=RunOptions(overwrite=True, quiet=True),
+        )
+
+    made = optimised(6)
+    assert made.design == "optimised"
+    assert made.assignment[0] == f"{RADIUS}=0.01, bin.pose.xyz.0=0.15"
+    assert made.base == 0
+    assert len(set(made.assignment)) == 6
+    assert made.best == int(np.argmax(made.objective[:, 0]))
+    again = optimised(6)
+    assert again.stamp == made.stamp
+    assert np.array_equal(again.objective, made.objective)
+
+
+def test_two_designs_are_refused(tmp_path: Path) -> None:
+    """A Latin hypercube is not optimised."""
+    with pytest.raises(SettingsError, match="not both"):
+        study("planar-toy", tmp_path / "s.h5", vary=["seed=1,2"], samples=3, optimise=3)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
@@ -40,7 +41,7 @@ from reachmap.plots.parts.style import (
     put_title,
 )
 
-LEFT, RIGHT, TOP, BOTTOM = 0.80, 1.05, 1.05, 1.75
+LEFT, RIGHT, TOP, BOTTOM = 0.80, 1.05, 1.05, 2.0
 WIDEST, TALLEST, ROOM_M = 5.6, 5.6, 0.15
 LINE = 0.19
 
@@ -81,7 +82,13 @@ def _draw_places(placement: BasePlacement, percent_map: PercentMap) -> Figure:
     marks = _draw_squares(axes, placement, percent_map)
     for outline in outlines:
         draw_outline(axes, outline)
-    handles = [*legend_lines(outlines), *_draw_arrows(axes, placement)]
+    # Bodies look alike; one entry stands for them all.
+    named = {o.kind: o for o in reversed(outlines) if o.name}
+    legend = [
+        dataclasses.replace(o, name="bodies") if kind == "body" else o
+        for kind, o in reversed(named.items())
+    ]
+    handles = [*legend_lines(legend), *_draw_arrows(axes, placement)]
     if marks is not None:
         bar = (LEFT + width + 0.2, BOTTOM, 0.14, height)
         colour_bar(figure, marks, bar, "bound of path reachability [%]")

@@ -44,13 +44,12 @@ def tally(payload: Mapping[str, Any]) -> tuple[int, int]:
 def assemble(
     document: Mapping[str, Any], payloads: Sequence[Any], *, run: RunInfo
 ) -> Study:
-    """Make the study; units are variants that differ, rows are all of them."""
-    rows = document["rows"]
+    """Make the study; units are variants that differ, rows are all of them.
+
+    Of variants that were proposed one after the other, each payload tells its row.
+    """
     names = tuple(document["objectives"])
-    found = [
-        failure(row["cause"]) if row["unit"] is None else payloads[row["unit"]]
-        for row in rows
-    ]
+    rows, found = _rows(document, payloads)
     outcomes = [
         {name: Outcomes(**value) for name, value in payload["outcomes"].items()}
         for payload in found
@@ -93,6 +92,24 @@ def assemble(
         provenance=provenance_from_document(document),
         run=run,
     )
+
+
+def _rows(
+    document: Mapping[str, Any], payloads: Sequence[Any]
+) -> tuple[Sequence[Any], list[Any]]:
+    """Rows and the payload of each."""
+    if "rows" not in document:
+        nothing = {
+            "values": [np.nan] * len(document["parameter_names"]),
+            "assignment": "",
+            "cell_sha256": "",
+        }
+        return [payload.get("row", nothing) for payload in payloads], [*payloads]
+    rows = document["rows"]
+    return rows, [
+        failure(row["cause"]) if row["unit"] is None else payloads[row["unit"]]
+        for row in rows
+    ]
 
 
 def _hashes(found: Sequence[Mapping[str, Any]], name: str) -> tuple[str, ...]:

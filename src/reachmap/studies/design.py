@@ -62,9 +62,23 @@ class Variant:
             for factor, text in zip(factors, self.overrides, strict=True)
         )
 
+    def row(self, factors: Sequence[Factor]) -> dict[str, Any]:
+        """What a study holds of it before it is computed."""
+        return {
+            "values": list(self.values),
+            "assignment": self.assignment(factors),
+            "unit": None,
+            "cell_sha256": "",
+            "cause": "",
+        }
+
 
 def factors_of(
-    texts: Sequence[str], base: LoadedCell, *, sampled: bool
+    texts: Sequence[str],
+    base: LoadedCell,
+    *,
+    sampled: bool = False,
+    optimised: bool = False,
 ) -> tuple[Factor, ...]:
     """Read ``NAME=LOW:HIGH:N`` and ``NAME=a,b,c``.
 
@@ -75,13 +89,18 @@ def factors_of(
         The cell as it is, with its parameters.
     sampled : bool
         Whether ranges ``NAME=LOW:HIGH`` are to be sampled.
+    optimised : bool
+        Whether such ranges may stand beside those with steps.
 
     Raises
     ------
     SettingsError
         One of them is neither, or a name occurs twice.
     """
-    factors = tuple(_factor(text, base, sampled) for text in texts)
+    factors = tuple(
+        _factor(text, base, sampled or (optimised and text.count(":") == 1))
+        for text in texts
+    )
     keys = [factor.key for factor in factors]
     for key in keys:
         if keys.count(key) > 1:
@@ -173,7 +192,7 @@ def grid(factors: Sequence[Factor]) -> list[Variant]:
             "--latin-hypercube N"
         )
     return [
-        _variant(factors, place)
+        variant_at(factors, place)
         for place in itertools.product(*(range(len(f.texts)) for f in factors))
     ]
 
@@ -195,27 +214,27 @@ def latin_hypercube(factors: Sequence[Factor], count: int, seed: int) -> list[Va
 
 
 def _sampled(factors: Sequence[Factor], row: FloatArray) -> Variant:
+    place = [
+        share * len(f.texts)
+        if f.texts
+        else f.numbers[0] + share * (f.numbers[1] - f.numbers[0])
+        for f, share in zip(factors, row, strict=True)
+    ]
+    return variant_at(factors, place)
+
+
+def variant_at(factors: Sequence[Factor], place: Sequence[float]) -> Variant:
+    """Variant at a place: in the list of each factor, or in its range."""
     texts, values = [], []
-    for factor, share in zip(factors, row, strict=True):
+    for factor, at in zip(factors, place, strict=True):
         if factor.texts:
-            place = int(share * len(factor.texts))
-            text, value = factor.texts[place], factor.numbers[place]
+            text, value = factor.texts[int(at)], factor.numbers[int(at)]
         else:
-            low, high = factor.numbers
-            value = float(f"{low + share * (high - low):.6g}")
+            value = float(f"{at:.6g}")
             text = f"{value:.6g}"
         texts.append(f"{factor.key}={text}")
         values.append(value)
     return Variant(overrides=tuple(texts), values=tuple(values))
-
-
-def _variant(factors: Sequence[Factor], place: Sequence[int]) -> Variant:
-    return Variant(
-        overrides=tuple(
-            f"{f.key}={f.texts[k]}" for f, k in zip(factors, place, strict=True)
-        ),
-        values=tuple(f.numbers[k] for f, k in zip(factors, place, strict=True)),
-    )
 
 
 def base_of(
@@ -232,6 +251,22 @@ def base_of(
             distance += np.abs(values - own) / spread
     # Values that were rounded on the way are as close as those that were not.
     return int(np.argmin(np.round(distance, 9)))
+
+
+def place_of(factors: Sequence[Factor], base: LoadedCell) -> tuple[float, ...]:
+    """Place nearest to the cell as it is; the middle where it has no such value."""
+    data = json.loads(base.resolved_json)
+    found = []
+    for factor in factors:
+        own, numbers = _own_value(factor, data), np.array(factor.numbers)
+        if not factor.texts:
+            own = float(numbers.mean()) if own is None else own
+            found.append(float(np.clip(own, *numbers)))
+        elif own is None:
+            found.append(float(len(numbers) // 2))
+        else:
+            found.append(float(np.argmin(np.round(np.abs(numbers - own), 9))))
+    return tuple(found)
 
 
 def _own_value(factor: Factor, data: Mapping[str, Any]) -> float | None:

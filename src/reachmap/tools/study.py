@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import re
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -25,8 +26,11 @@ from reachmap.studies.design import (
     factors_of,
     grid,
     latin_hypercube,
+    place_of,
 )
+from reachmap.studies.optimiser import Optimiser
 from reachmap.studies.outcomes import OPERATORS, Requirement
+from reachmap.tools.optimised_study import Search, search_work
 from reachmap.tools.options import with_seed
 from reachmap.tools.prologue import (
     check_scan_output,
@@ -53,6 +57,7 @@ def study(
     *,
     vary: Sequence[str],
     samples: int | None = None,
+    optimise: int | None = None,
     place: bool = False,
     objectives: Sequence[str] = (),
     require: Sequence[str] = (),
@@ -73,6 +78,8 @@ def study(
         as ``--set`` takes it.
     samples : int, optional
         Variants of a Latin hypercube instead of every combination.
+    optimise : int, optional
+        Variants that an optimiser proposes, each from what those before were worth.
     place : bool
         Place the bin anew in each variant.
     objectives : sequence of str
@@ -101,36 +108,80 @@ def study(
     overrides = with_seed(overrides, seed)
     base = read_cell(cell, overrides)
     refuse_cell_files([output], base)
-    factors = factors_of(vary, base, sampled=samples is not None)
+    if samples is not None and optimise is not None:
+        raise SettingsError("give --optimise or --latin-hypercube, not both")
+    factors = factors_of(
+        vary, base, sampled=samples is not None, optimised=optimise is not None
+    )
     if not factors:
         raise SettingsError("nothing to vary: give --vary NAME=LOW:HIGH:N")
-    variants = (
-        grid(factors)
-        if samples is None
-        else latin_hypercube(factors, samples, base.cell.seed)
-    )
-    rows, cells = _rows(cell, overrides, factors, variants)
     settings = {
         "vary": list(vary),
         "samples": samples,
+        **({} if optimise is None else {"optimise": optimise}),
         "bin": "placed" if place else "kept",
         "objectives": list(names),
         "require": [str(item) for item in requirements],
     }
     document = _document(base, settings) | {
-        "design": "grid" if samples is None else "latin_hypercube",
         "bin_mode": settings["bin"],
-        "base": base_of(factors, variants, base),
         "parameter_names": [factor.name for factor in factors],
         "parameter_units": [factor.unit for factor in factors],
         "objectives": list(names),
         "requirements": [dataclasses.asdict(item) for item in requirements],
-        "rows": rows,
     }
-    work = study_work(cells, document, names, places_bin=place)
+    design = _Design(cell, tuple(overrides), factors, base, requirements, names, place)
+    work = (
+        design.work(document, samples)
+        if optimise is None
+        else design.search(document, optimise)
+    )
     outcome = run_scan(work, output=output, options=run, label="study")
     result: Study = outcome.artefact
     return result
+
+
+@dataclass(frozen=True, slots=True)
+class _Design:
+    """What is varied, and what for; see :func:`study`."""
+
+    cell: str
+    overrides: tuple[str, ...]
+    factors: tuple[Factor, ...]
+    base: LoadedCell
+    requirements: tuple[Requirement, ...]
+    objectives: tuple[str, ...]
+    places_bin: bool
+
+    def work(self, document: dict[str, Any], samples: int | None) -> Work:
+        """Work of variants that are known beforehand."""
+        variants = (
+            grid(self.factors)
+            if samples is None
+            else latin_hypercube(self.factors, samples, self.base.cell.seed)
+        )
+        rows, cells = _rows(self.cell, self.overrides, self.factors, variants)
+        document |= {
+            "design": "grid" if samples is None else "latin_hypercube",
+            "base": base_of(self.factors, variants, self.base),
+            "rows": rows,
+        }
+        return study_work(cells, document, self.objectives, places_bin=self.places_bin)
+
+    def search(self, document: dict[str, Any], count: int) -> Work:
+        """Work of variants that an optimiser proposes, the cell as it is first."""
+        first = place_of(self.factors, self.base)
+        search = Search(
+            cell=self.cell,
+            overrides=self.overrides,
+            factors=self.factors,
+            optimiser=Optimiser(self.factors, count, self.base.cell.seed, first),
+            requirements=self.requirements,
+        )
+        document |= {"design": "optimised", "base": 0}
+        return search_work(
+            search, document, self.objectives, places_bin=self.places_bin
+        )
 
 
 def _requirement(text: str) -> Requirement:
@@ -172,13 +223,7 @@ def _rows(
     cells: dict[str, LoadedCell] = {}
     error: CellError | None = None
     for variant in variants:
-        row: dict[str, Any] = {
-            "values": list(variant.values),
-            "assignment": variant.assignment(factors),
-            "unit": None,
-            "cell_sha256": "",
-            "cause": "",
-        }
+        row = variant.row(factors)
         try:
             loaded = read_cell(cell, [*overrides, *variant.overrides])
             cells.setdefault(loaded.sha256, loaded)

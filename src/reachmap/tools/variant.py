@@ -93,6 +93,29 @@ def compute_variant(context: VariantContext, unit: VariantUnit) -> dict[str, Any
         return failure(_cause(error))
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Proposal:
+    """A variant that an optimiser proposed; without a cell where that is wrong."""
+
+    row: Mapping[str, Any]
+    loaded: LoadedCell | None
+
+
+def compute_proposal(context: VariantContext, unit: Proposal) -> dict[str, Any]:
+    """Map a proposed variant, its workspace included; the row goes with it."""
+    if unit.loaded is None:
+        return failure(unit.row["cause"]) | {"row": dict(unit.row)}
+    workspace = -1
+    if needs_workspace(context.objectives, places_bin=context.places_bin):
+        workspace = 0
+        shared = map_workspace(None, unit.loaded)
+        context = dataclasses.replace(context, workspaces=[shared])
+    found = compute_variant(
+        context, VariantUnit(loaded=unit.loaded, workspace=workspace)
+    )
+    return found | {"row": dict(unit.row)}
+
+
 def _computed(context: VariantContext, unit: VariantUnit) -> dict[str, Any]:
     sha256: dict[str, str] = {}
     outcomes: dict[str, Outcomes] = {}

@@ -38,7 +38,7 @@ COUNTS: Final = {
     "lost": "Shared frames that the base alone reaches.",
 }
 ATTRIBUTES: Final = {
-    "design": "How variants were chosen: `grid` or `latin_hypercube`.",
+    "design": "How variants were chosen: `grid`, `latin_hypercube` or `optimised`.",
     "bin_mode": "Whether the bin was `kept` where the cell has it, or `placed`.",
     "base": "Variant that the others are compared with.",
     "best": "Best variant that meets the requirements, -1: none.",

@@ -40,7 +40,7 @@ class Study:
 
     Attributes
     ----------
-    design : {"grid", "latin_hypercube"}
+    design : {"grid", "latin_hypercube", "optimised"}
     bin_mode : {"kept", "placed"}
         Whether the bin stays where each variant's cell has it.
     parameter_names, parameter_units : tuple of str
