@@ -16,7 +16,7 @@ class AnswerError(OSError):
 
 
 class _Answer(io.FileIO):
-    """Standard output whose failures are told apart from those of other files."""
+    """Standard output whose failures are distinguished from those of other files."""
 
     def write(self, data: Any, /) -> int:
         try:

@@ -129,7 +129,7 @@ def test_what_is_no_file_is_refused(
         mode = place.stat().st_mode
         result = run(f"{command.format(o=place)} --overwrite", monkeypatch)
         assert result.exit_code == 2, result.output
-        assert "no regular file" in result.stderr or "is a folder" in result.stderr
+        assert "not a regular file" in result.stderr or "is a folder" in result.stderr
         assert place.stat().st_mode == mode
 
 

@@ -172,7 +172,7 @@ def test_told_to_stop(tmp_path, number, workers):
     assert time.monotonic() - began < 5
     assert process.returncode == 130
     assert "units are safe in" in err
-    assert "to go on: toy_work.py" in err
+    assert "to resume: toy_work.py" in err
     if number != signal.SIGHUP:  # which multiprocessing's own helper does not expect
         assert "Traceback" not in err
     assert not any(child.is_running() for child in children)

@@ -286,5 +286,5 @@ def test_an_executor_that_drops_its_work_leaves_it_to_be_resumed():
                 future.cancel()
                 future.set_running_or_notify_cancel()
 
-    with pytest.raises(IncompleteError, match="the same command goes on"):
+    with pytest.raises(IncompleteError, match="run the same command again"):
         run(Gone(1), 3)

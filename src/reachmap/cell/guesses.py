@@ -19,8 +19,8 @@ TIP_NAMES = (
 )
 FINGER_WORDS = re.compile(r"finger|gripper|jaw|knuckle|claw|thumb|griper|pincer")
 FINGER_LINKS = re.compile(r"finger|jaw|knuckle|claw|thumb")
-# An arm has at least so many joints before its hand branches into fingers of at most
-# so many; a torso that branches into arms has longer branches.
+# An arm has at least this many joints before its hand branches into fingers of at most
+# this many; a torso that branches into arms has longer branches.
 ARM_JOINTS, FINGER_JOINTS = 4, 4
 
 
@@ -35,7 +35,7 @@ def guess_base(robot: UrdfDescription) -> str:
 def guess_tip(robot: UrdfDescription, base: str, joints: Collection[str] = ()) -> str:
     """Link to carry the tool: one with a well-known name, else the arm's last.
 
-    Joints of fingers do not count as the arm's, and links beyond them are no flange. A
+    Joints of fingers do not count as the arm's, and no link beyond them is a flange. A
     well-known name must end a chain at least half as long as the longest.
 
     Parameters

@@ -165,7 +165,7 @@ class Margins:
 
 
 class StageStatus(IntEnum):
-    """What became of a stage of the cycle; the first six mean what they do elsewhere.
+    """Outcome of a stage of the cycle; the first six mean what they do elsewhere.
 
     The stored codes never change meaning.
     """

@@ -27,7 +27,7 @@ NO_PAIR = -1
 
 
 class Status(IntEnum):
-    """What became of a test frame; the stored codes never change meaning."""
+    """Outcome of a test frame; the stored codes never change meaning."""
 
     NOT_ATTEMPTED = 0
     PATH_FOUND = 1

@@ -15,7 +15,7 @@ Order = Literal["highest", "rank"]
 
 
 class Fate(IntEnum):
-    """What became of a part."""
+    """Outcome of a part."""
 
     PICKED = 0
     UNREACHABLE = 1

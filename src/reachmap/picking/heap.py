@@ -21,7 +21,7 @@ CELL_SHARE, FINEST_M, COARSEST_M = 0.25, 0.002, 0.01
 # A part slides down a steeper slope; friction of plastic and metal allows 0.5.
 STEEPEST = 0.5
 TRIES = 20
-# A part rolls to the lowest of so many places.
+# A part rolls to the lowest of this many places.
 PLACES = 6
 # A part is covered by another that hides its middle, or this share of its top.
 COVERED_SHARE = 0.25

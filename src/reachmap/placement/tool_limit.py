@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from reachmap.cell.loading import LoadedCell
     from reachmap.core.robot.model import RobotModel
 
-# Every dimension is changed by as much, on so many of the test grasps that are lost.
+# Every dimension is changed by as much, on this many of the test grasps that are lost.
 STEP_M, MOST_FRAMES = 0.02, 500
 ON_AXIS_M = 1e-3
 

@@ -165,7 +165,7 @@ def read_run_folder(folder: Path) -> RunFolder:
     Raises
     ------
     MapFileError
-        It is no folder, or none of its artefacts can be read.
+        It is not a folder, or none of its artefacts can be read.
     """
     if not is_folder(folder):
         raise MapFileError(f"{folder}: no such folder")

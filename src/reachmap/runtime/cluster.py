@@ -100,7 +100,7 @@ class DaskSlot(Slot):
         elif now - self._seen_s > WAIT_FOR_WORKERS_S:
             raise IncompleteError(
                 f"the Dask cluster has had no workers for {WAIT_FOR_WORKERS_S:.0f} s; "
-                "what is done is kept, the same command goes on from there"
+                "finished work is kept; run the same command again to resume"
             )
 
 

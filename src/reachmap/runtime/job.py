@@ -208,7 +208,7 @@ class Measure:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Reply:
-    """What came of a unit: its payload as text, or the text of what went wrong."""
+    """Result of a unit: its payload as text, or the text of what went wrong."""
 
     index: int
     text: str

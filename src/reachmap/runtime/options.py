@@ -72,7 +72,7 @@ def _has_host(address: str) -> bool:
     try:
         parts = urlsplit(address)
         return parts.scheme in SCHEMES and bool(parts.hostname) and bool(parts.port)
-    except ValueError:  # a port that is no number, or none there is
+    except ValueError:  # a port that is not a number, or is out of range
         return False
 
 

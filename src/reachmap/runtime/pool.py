@@ -77,7 +77,7 @@ class Slot:
         executor.shutdown(wait=False, cancel_futures=True)
 
     def is_lost(self, error: BaseException) -> bool:
-        """Whether an error of a future says that the executor is of no use any more."""
+        """Whether an error of a future says that the executor is broken."""
         return isinstance(error, BrokenExecutor)
 
     def deaths(self, error: BaseException) -> int:
@@ -88,7 +88,7 @@ class Slot:
         """Whether one more unit may be handed in."""
         if self.suspects or self.alone:
             return not self.held
-        # Nothing but the job until a worker is ready: a death then is no unit's fault.
+        # Nothing but the job until a worker is ready: no unit is to blame then.
         return None not in self.held.values() and len(self.held) < self.window()
 
     def get_ready(self, ticket: Ticket) -> bool:
@@ -130,7 +130,7 @@ class Pool:
     ----------
     slots_for : callable
         ``slots_for(units, most)``: the slots for a number of units, of which at most
-        so many may be used.
+        that many may be used.
     """
 
     def __init__(self, slots_for: Callable[[int, int | None], Sequence[Slot]]) -> None:
@@ -172,7 +172,7 @@ class Pool:
             Wrong input, or workers that cannot do their work.
         """
         slots = slots or self.slots(len(units))
-        for slot in slots:  # a job that was broken off may have left something
+        for slot in slots:  # an aborted job may have left something
             if slot.held or slot.suspects:
                 slot.suspects.clear()
                 slot.let_go()
@@ -300,7 +300,7 @@ def _exception(future: Future[Any]) -> BaseException | None:
     except CancelledError:
         return IncompleteError(
             "the executor dropped its work (has the scheduler gone?); what is done is "
-            "kept, the same command goes on from there"
+            "kept; run the same command again to resume"
         )
 
 

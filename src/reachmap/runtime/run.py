@@ -209,7 +209,7 @@ def run_units(
         except KeyboardInterrupt:
             raise Interrupted(
                 f"interrupted: {store.safe_text()}\n"
-                f"to go on: {command_line().replace(' --restart', '')}"
+                f"to resume: {command_line().replace(' --restart', '')}"
             ) from None
         if options.shard is None and not results.failed:
             store.remove()
@@ -313,7 +313,7 @@ class _Run:
             self._pool = self.stack.enter_context(open_pool(self.options))
         slots = self._pool.slots(len(todo), most)
         with (
-            # A unit in this process is broken off; others are let to arrive.
+            # A unit in this process is aborted; others may finish.
             nullcontext() if slots[0].is_here else self.stop.deferred(),
             closing(self._pool.replies(job, todo, slots)) as replies,
         ):
@@ -351,7 +351,8 @@ def _publish(
             work.kind.write(output, artefact, overwrite=overwrite)
         _note(store, identity(output))
     except OutputError as error:
-        lines = [*error.lines, f"{store.safe_text()}; the same command goes on"]
+        resume = f"{store.safe_text()}; run the same command again to resume"
+        lines = [*error.lines, resume]
         if isinstance(error, NoRoomError):
             raise IncompleteError([*lines, "free some space first"]) from error
         raise OutputError(lines) from error

@@ -118,7 +118,7 @@ class Store(Entries):
         remedy = "free some space" if error.errno in NO_ROOM else "see to that"
         return IncompleteError(
             f"{self.path}: {error.strerror}; {self.safe_text('there')}; {remedy}, then "
-            "the same command goes on from them"
+            "run the same command again to resume"
         )
 
     def mend(self) -> None:
@@ -155,7 +155,7 @@ def open_store(path: Path, header: Header, *, restart: bool = False) -> Iterator
     Raises
     ------
     OutputError
-        When it cannot be written, is no regular file, or another run is writing it.
+        When it cannot be written, is not a regular file, or another run is writing it.
     MapFileError
         When it belongs to other settings, or is not a store.
     """
@@ -173,7 +173,7 @@ def open_store(path: Path, header: Header, *, restart: bool = False) -> Iterator
         try:
             yield store
         except BaseException:
-            with suppress(IncompleteError):  # what went wrong first is the news
+            with suppress(IncompleteError):  # the first error is what matters
                 store.sync()
             raise
         store.sync()

@@ -69,7 +69,7 @@ class FrameGrid:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FrameList:
-    """Frames that are no product of points and orientations.
+    """Frames that are not a product of points and orientations.
 
     Attributes
     ----------

@@ -32,7 +32,7 @@ NO_PATH = -2
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GraspResults:
-    """What became of test grasps and their attempts.
+    """Outcomes of test grasps and of their attempts.
 
     Attributes
     ----------

@@ -26,7 +26,7 @@ from reachmap.scans.document import provenance_from_document
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FrameResults:
-    """What became of test frames, in the order of the cubes.
+    """Outcomes of test frames, in the order of the cubes.
 
     Attributes
     ----------

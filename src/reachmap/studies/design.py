@@ -34,7 +34,7 @@ class Factor:
     key : str
         What ``--set`` takes.
     unit : str
-        "" for none; ``choice`` where the values are no numbers.
+        "" for none; ``choice`` where the values are not numbers.
     texts : tuple of str
         The values as YAML; empty for a range to be sampled.
     numbers : tuple of float

@@ -17,12 +17,12 @@ from reachmap.sampling.frames import FrameGrid, approach_distance_m, bin_test_fr
 from reachmap.scans.ik_survey import survey_frames
 from reachmap.tools.trial import reach_of
 
-# A place is taken where so much of a few test grasps can be met: the walls deny others
-# to any tool.
+# A place is taken where this share of a few test grasps can be reached: the walls deny
+# others to any tool.
 ENOUGH = 0.4
 # Tools that are tried, in depths of the bin: a flange has to stay above the rim.
 TOOLS = (0.0, 0.5, 1.0, 2.0, 3.0)
-# A longer tool is as unusual as so many other places are.
+# A longer tool is as unusual as this many other places are.
 PLACES_PER_TOOL = 3
 # So many pairs of both are looked at before the best of them is taken.
 MOST = 60

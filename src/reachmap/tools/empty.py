@@ -32,7 +32,7 @@ ORDERS = ("highest", "rank")
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class SimulatedHeap:
-    """A heap and what became of it.
+    """A heap and how it was emptied.
 
     Attributes
     ----------

@@ -81,7 +81,7 @@ def study(
     optimise : int, optional
         Variants that an optimiser proposes, each from what those before were worth.
     place : bool
-        Place the bin anew in each variant.
+        Place the bin again in each variant.
     objectives : sequence of str
         Keys of :data:`~reachmap.maps.study.record.OBJECTIVES`, all by default; the
         first says which variant is best.

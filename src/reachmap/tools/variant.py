@@ -63,7 +63,7 @@ class VariantContext:
 
 
 def needs_workspace(objectives: Sequence[str], *, places_bin: bool) -> bool:
-    """Whether the objectives rest on a workspace map."""
+    """Whether the objectives need a workspace map."""
     return places_bin or not OF_WORKSPACE.isdisjoint(objectives)
 
 

@@ -79,8 +79,8 @@ def verify(paths: Sequence[Path]) -> Verification:
     """Check files for damage, and against the contract of their kind.
 
     Every byte is read, so that the checksums of HDF5 are compared; the hashes over
-    content and file are computed anew; names, dimensions, types, units and ranges are
-    compared with the format; percentages are computed anew from the status.
+    content and file are recomputed; names, dimensions, types, units and ranges are
+    compared with the format; percentages are recomputed from the status.
 
     Parameters
     ----------

@@ -78,7 +78,7 @@ class Confusion:
 def confusion_of(
     predicted: BoolArray, reached: BoolArray, outside: BoolArray
 ) -> Confusion:
-    """Count predictions by what became of them, arrays of shape (n,)."""
+    """Count predictions by their outcome, arrays of shape (n,)."""
 
     def count(mask: BoolArray) -> int:
         return int(np.count_nonzero(mask))
@@ -115,7 +115,7 @@ def rank_correlation(a: FloatArray, b: FloatArray) -> RankCorrelation:
 
 
 def expected_calls(chance: FloatArray, order: IntArray, successes: int = 1) -> float:
-    """Planner calls until so many succeed, one call per grasp in the given order.
+    """Planner calls until enough succeed, one call per grasp in the given order.
 
     Parameters
     ----------

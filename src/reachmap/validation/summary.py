@@ -119,7 +119,7 @@ class Validation:
         Of a single attempt's path length, state checks, CPU and execution time: what
         share of the variance is the grasp and not luck.
     diagram : ReliabilityDiagram
-        Predicted probabilities beside what became of the grasps.
+        Predicted probabilities beside the outcomes of the grasps.
     """
 
     settings: Mapping[str, Any]

@@ -52,7 +52,7 @@ def test_every_kind_of_shape_is_read(
         (['<box size="1 1"/>'], "expected 3 finite numbers"),
         (['<sphere radius="nan"/>'], "expected a finite number"),
         (["<mesh/>"], "<mesh> needs a filename"),
-        (['<mesh filename="a.stl" scale="0 1 1"/>'], "0 is no scale"),
+        (['<mesh filename="a.stl" scale="0 1 1"/>'], "0 is not a scale"),
         (['<mesh filename="a.stl" scale="1 inf 1"/>'], "expected 3 finite numbers"),
     ],
 )

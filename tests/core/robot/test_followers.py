@@ -202,5 +202,5 @@ def test_a_joint_that_mimics_nothing_is_one_of_its_own(tmp_path: Path) -> None:
     """As MoveIt has it, and said in a warning."""
     stray = ARM[6].replace(LIMIT, LIMIT + '<mimic joint="gone"/>')
     loaded = load(tmp_path, robot(*ARM[:6], stray), "l3", JOINTS)
-    assert "joint 'j3' mimics 'gone', which is no moving joint" in loaded.warnings[0]
+    assert "joint 'j3' mimics 'gone', which is not a moving joint" in loaded.warnings[0]
     assert Scene.build(loaded).robot.joint_names == JOINTS

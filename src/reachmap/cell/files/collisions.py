@@ -119,7 +119,8 @@ def _shape(link: str, element: ElementTree.Element) -> LinkShape:
     if given.tag == "mesh":
         scale = _numbers(given, "scale", 3) if "scale" in given.attrib else [1.0] * 3
         if not all(scale):
-            raise ValueError(f"<mesh scale>: 0 is no scale (got {given.get('scale')})")
+            got = given.get("scale")
+            raise ValueError(f"<mesh scale>: 0 is not a scale (got {got})")
         if not given.get("filename"):
             raise ValueError("<mesh> needs a filename")
         return LinkShape(

@@ -50,7 +50,7 @@ class MoveItFile:
 def parse_joint_limits(
     text: str, source: str, robot: UrdfDescription | None
 ) -> MoveItFile:
-    """Read a MoveIt file, and note names that are no joints of the robot.
+    """Read a MoveIt file, and note names that are not joints of the robot.
 
     Raises
     ------

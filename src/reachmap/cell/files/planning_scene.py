@@ -43,7 +43,7 @@ class SceneBody:
 def read_scene(path: Path) -> tuple[list[SceneBody], list[str]]:
     """Read the bodies of a file, and say what of it cannot be used.
 
-    A YAML file that is no planning scene has no bodies.
+    A YAML file that is not a planning scene has no bodies.
 
     Raises
     ------

@@ -107,7 +107,7 @@ def _placed(
     root: ElementTree.Element, tag: str, text: str, label: str
 ) -> Iterator[tuple[str, ElementTree.Element]]:
     """Elements directly below the root, each with file and line."""
-    # ElementTree forgets lines; the n-th start tag that is no comment is its own.
+    # ElementTree forgets lines; the n-th start tag that is not a comment is its own.
     starts = [
         match.start(1)
         for match in re.finditer(rf"<!--.*?-->|<({tag})(?=[\s/>])", text, re.DOTALL)

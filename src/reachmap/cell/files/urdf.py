@@ -226,7 +226,7 @@ def _with_leaders(joints: list[UrdfJoint], notes: list[str]) -> list[UrdfJoint]:
     leaders = {joint.name for joint in joints if joint.type in MOVING}
     stray = {j.name for j in joints if j.mimics is not None and j.mimics not in leaders}
     notes += [
-        f"joint {joint.name!r} mimics {joint.mimics!r}, which is no moving joint; "
+        f"joint {joint.name!r} mimics {joint.mimics!r}, which is not a moving joint; "
         "it is taken for a joint of its own"
         for joint in joints
         if joint.name in stray

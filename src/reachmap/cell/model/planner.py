@@ -51,8 +51,8 @@ class PlannerSpec(GrowingRecord):
     restart_checks: int | None = Field(
         150,
         ge=1,
-        description="A search that found nothing after so many state checks begins "
-        "anew, each time with twice as many; null: it goes on.",
+        description="A search that found nothing after so many state checks starts "
+        "over, each time with twice as many; null: it continues.",
     )
     time_limit_s: Positive = Field(
         60.0, description="Safety net [s]; recorded when it ends an attempt."

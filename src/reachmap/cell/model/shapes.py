@@ -98,7 +98,7 @@ def box_corners(sides_m: FloatArray) -> FloatArray:
 
 
 def shrunk(shape: Solid, by_m: float) -> Solid:
-    """A box, mesh or convex body, smaller by so much along each axis."""
+    """A box, mesh or convex body, smaller by this much along each axis."""
     if by_m == 0:
         return shape
     size = sides(shape)

@@ -37,7 +37,7 @@ _OPERATORS: Final = (
 
 
 class ExpressionError(ValueError):
-    """An expression that is no number; the message says why."""
+    """An expression that is not a number; the message says why."""
 
 
 class Evaluator:
@@ -191,7 +191,7 @@ def _expressions(data: Any, location: Location) -> Iterator[tuple[Location, str]
 
 def _finite(value: object, text: str) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise ExpressionError(f"{text!r} is no number (got {value!r:.60})")
+        raise ExpressionError(f"{text!r} is not a number (got {value!r:.60})")
     if not math.isfinite(value):
         raise ExpressionError(f"{text!r} is not finite")
     # Counts are whole numbers however they were computed.

@@ -92,7 +92,7 @@ class BinFit:
         geometry = build_geometry(robot, loaded, with_bin=False)
         bodies = bodies_at(robot, geometry, np.zeros(robot.dof) if q is None else q)
         parts = parts_of_bin(loaded)
-        # A little smaller, so that standing on a table is no collision.
+        # A little smaller, so that standing on a table is not a collision.
         still_parts = [_part(part, CONTACT_M) for part in parts]
         if empty:
             still_parts.append(_part(_around(parts), CONTACT_M))
@@ -228,7 +228,7 @@ class _Group:
 
 
 def _part(part: BinPart, shrink_m: float) -> Part:
-    """Name, shape and place of a part, smaller by so much along each axis."""
+    """Name, shape and place of a part, smaller by this much along each axis."""
     return part.name, coal_shape(shrunk(part.shape, shrink_m)), part.centre_m
 
 

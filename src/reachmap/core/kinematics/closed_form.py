@@ -42,12 +42,12 @@ SELF_TESTS = 200
 # A refined row that misses its pose by no more than this is a solution [m and rad].
 ACCEPTED = 1e-7
 
-# A configuration whose Jacobian has a smaller singular value is no fair trial.
+# A configuration whose Jacobian has a smaller singular value is not a fair trial.
 _REGULAR = 1e-3
 
 
 # A larger tolerance allows for rounded angles; what they miss a pose by moves joints
-# by so much more at most in a fair trial [rad per m or rad].
+# by at most this much more in a fair trial [rad per m or rad].
 _FOR_ROUNDED = 1e-6
 _ROUNDED_APART = 100.0
 

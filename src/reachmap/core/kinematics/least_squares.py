@@ -57,7 +57,7 @@ def least_squares_many(
     iterations : int
         Steps at most.
     patience : int
-        A row that has not become ten times better in so many steps is given up.
+        A row that has not become ten times better in this many steps is given up.
     limits : tuple of array, shape (dof,), optional
         Lower and upper limits that steps do not leave.
 

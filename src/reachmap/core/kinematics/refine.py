@@ -13,7 +13,7 @@ ACCEPTED = 1e-7
 # Rows per block, so that Jacobians stay in the cache.
 _BLOCK = 512
 
-# A row that has not become ten times better in so many steps is given up.
+# A row that has not become ten times better in this many steps is given up.
 _PATIENCE = 15
 
 # A row is done when it misses by no more than this [m and rad].
@@ -40,7 +40,7 @@ def refine_many(
 ) -> tuple[FloatArray, FloatArray]:
     """Move configurations so that the TCP meets its goal, at singularities as well.
 
-    Singular values, several times as dear as normal equations, do not square the
+    Singular values, several times as expensive as normal equations, do not square the
     condition number: needed within about 1e-6 rad of a singularity.
 
     Parameters

@@ -35,7 +35,7 @@ _ROUNDING_M = 1e-9
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Lift:
-    """What became of the lift from one configuration.
+    """Outcome of the lift from one configuration.
 
     Attributes
     ----------

@@ -63,7 +63,7 @@ class Budget:
         return self.out_of_time
 
     def begin_search(self, checks: int) -> None:
-        """Allow the search that begins so many checks of those that are left."""
+        """Give the search that begins a share of the remaining checks."""
         self._search_limit = self._checker.checks + checks
         self._most_search_calls = self._calls + _CALLS_PER_CHECK * checks
         self.search_interrupted = False
@@ -93,7 +93,7 @@ ou.setLogLevel(ou.LogLevel.LOG_NONE)
 _OPTIMISING = frozenset(
     {"RRTstar", "BITstar", "InformedRRTstar", "SORRTstar", "AORRTC"}
 )
-# Their samples are drawn beforehand: begun anew they would have to be connected again.
+# Their samples are drawn beforehand: restarted, they would have to be connected again.
 _BATCH = frozenset({"FMT", "BFMT"})
 
 
@@ -115,7 +115,7 @@ class FoundPath:
 
 
 class OmplSearch:
-    """A planner of the cell's kind, made anew for each search.
+    """A planner of the cell's kind, made afresh for each search.
 
     Parameters
     ----------

@@ -1,9 +1,9 @@
 """Plans with OMPL from a configuration to any of a set of goals.
 
 A plan is found at the planning step, shortened, and counts only when it passes the
-verification distance; otherwise the attempt goes on with what is left of its budget.
+verification distance; otherwise the attempt continues with what is left of its budget.
 The straight motion to the nearest goal is tried before any search; a search that takes
-long is begun anew, for its length is luck more often than need.
+long is restarted, for its length is more often bad luck than need.
 Budgets are state checks, so the same seed gives the same path on any machine; the
 limit in seconds is a safety net that is recorded when it strikes.
 """
@@ -73,7 +73,7 @@ class PlanResult:
 
 
 class Planner:
-    """A planner of the cell's kind, made anew for each attempt.
+    """A planner of the cell's kind, made afresh for each attempt.
 
     Parameters
     ----------

@@ -71,7 +71,7 @@ def end_at_nearer_goal(
 ) -> FloatArray:
     """Leave the path at a way-point, straight to a goal, where that is shorter.
 
-    A planner stops at the first goal that it meets. With all goals at hand paths are
+    A planner stops at the first goal that it meets. With all goals available, paths are
     shorter and differ less from attempt to attempt.
     """
     before = np.concatenate([[0.0], np.cumsum(_steps_rad(path))])

@@ -29,7 +29,7 @@ _INTERNAL = {
     "_Netcdf4Dimid", "_Netcdf4Coordinates", "_NCProperties",
 }  # fmt: skip
 _TEXT = h5py.string_dtype()
-# What the netCDF library calls the scale of a dimension that is no variable.
+# What the netCDF library calls the scale of a dimension that is not a variable.
 _NO_VARIABLE = "This is a netCDF dimension but not a netCDF variable."
 
 

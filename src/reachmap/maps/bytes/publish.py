@@ -48,7 +48,7 @@ def check_output(
     Raises
     ------
     OutputError
-        The file exists, is no regular file or an input, its folder is missing or
+        The file exists, is not a regular file, or is an input, its folder is missing or
         read-only, or its name is one that cannot be stored.
     """
     target = real_path(path)
@@ -69,7 +69,7 @@ def _obstacle(path: Path, target: Path, *, overwrite: bool) -> str:
     if found is not None and stat.S_ISDIR(found.st_mode):
         return "is a folder; name a file"
     if found is not None and not stat.S_ISREG(found.st_mode):
-        return "is no regular file (a device, pipe or socket); name a file"
+        return "is not a regular file (a device, pipe or socket); name a file"
     if found is not None and _is_stream(found):
         return "is where this command's own output goes; name another file"
     if found is not None and not overwrite:

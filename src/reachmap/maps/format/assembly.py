@@ -83,7 +83,7 @@ def assemble(
     labels : mapping of str to sequence of str
         Lists that variables index, by the name the layout gives them.
     stamp, provenance, run
-        As in the record; the stamp's ``content_sha256`` is computed anew.
+        As in the record; the stamp's ``content_sha256`` is recomputed.
     cubes : sequence of str
         Names of the cubes of a workspace map.
     numbers : mapping of str to float, optional

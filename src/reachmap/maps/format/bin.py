@@ -62,7 +62,7 @@ BIN = Layout(
         "approach_axis": "TCP axis that points into the object, as in `+z`.",
         "approach_distance_m": "Length of the straight approach; 0: none.",
         "joint_names": "Names of the joints, in order.",
-        "body_pairs": "Names of two bodies each; blocking_pair counts in this list.",
+        "body_pairs": "Names of two bodies each; blocking_pair indexes this list.",
     },
     variables=(
         coordinate("layer", "Heights above the inner bottom.", "bin"),

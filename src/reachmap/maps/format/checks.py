@@ -95,7 +95,7 @@ def check_goals(goal: FloatArray, found: BoolArray, prefix: str) -> list[str]:
 
 
 def check_percent(tree: Tree, path: str, percent: FloatArray) -> list[str]:
-    """Compare stored percentages with those computed anew."""
+    """Compare stored percentages with recomputed ones."""
     stored = tree.array(path)
     same = np.isclose(stored, percent, atol=1e-9, rtol=0, equal_nan=True)
     return require(same, f"{path} must be what Eq. (1) gives for the status")

@@ -267,7 +267,7 @@ CYCLE = Section(
     lists={"stages": "stages"},
     arrays={
         "status": _stage(
-            "stage_status", "u1", "What became of the stage.", codes=StageStatus, **_ONE
+            "stage_status", "u1", "Outcome of the stage.", codes=StageStatus, **_ONE
         ),
         "blocking_pair": _stage(
             "stage_blocking_pair",

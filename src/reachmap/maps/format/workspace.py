@@ -96,7 +96,7 @@ def _check_cube(tree: Tree, prefix: str) -> list[str]:
 
 
 def _check_stitching(tree: Tree) -> list[str]:
-    """Eq. (1) anew from the cubes."""
+    """Eq. (1) again, from the cubes."""
     cubes = cubes_from_tree(tree)
     stitching = stitch_cubes(cubes)
     for axis in "xyz":
@@ -152,7 +152,7 @@ WORKSPACE = Layout(
     attributes={
         "method": "How paths were sought: `roadmap` or `per-frame`.",
         "joint_names": "Names of the joints, in order.",
-        "body_pairs": "Names of two bodies each; blocking_pair counts in this list.",
+        "body_pairs": "Names of two bodies each; blocking_pair indexes this list.",
     },
     variables=(
         coordinate("z", "Levels of the stitched lattice.", "robot_base"),

@@ -50,7 +50,7 @@ ROBUSTNESS = Layout(
     check=check_robustness,
     attributes={
         "margin_m": "Clearance that a path must keep in a perturbed cell.",
-        "body_pairs": "Names of two bodies each; closest_pair counts in this list.",
+        "body_pairs": "Names of two bodies each; closest_pair indexes this list.",
         "certificates": "What proves that a path stays free.",
     },
     variables=(

@@ -143,9 +143,7 @@ STUDY = Layout(
             meaning="Value of each parameter, in its own unit.",
             labels="parameter_units",
         ),
-        _of_variant(
-            "status", "u1", "What became of it.", labels="states", is_index=True
-        ),
+        _of_variant("status", "u1", "Its outcome.", labels="states", is_index=True),
         _of_variant("feasible", "u1", "1: it meets all requirements.", is_flag=True),
         *(_of_variant(name, "U", meaning) for name, meaning in TEXTS.items()),
         *(

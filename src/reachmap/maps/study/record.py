@@ -24,7 +24,7 @@ LOWER_IS_BETTER = frozenset({PATH_LENGTH})
 
 
 class VariantStatus(IntEnum):
-    """What became of a variant; the stored codes never change meaning."""
+    """Outcome of a variant; the stored codes never change meaning."""
 
     NOT_ATTEMPTED = 0
     DONE = 1
@@ -54,7 +54,7 @@ class Study:
     best, runner_up : int
         Of the variants that meet the requirements; -1: none.
     parameter : array, shape (nv, np)
-        Values; where they are no numbers, their place among those that are varied.
+        Values; where they are not numbers, their place among those that are varied.
     assignment : tuple of str
         What each variant sets.
     status : uint8 array, shape (nv,)

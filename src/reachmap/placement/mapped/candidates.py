@@ -1,4 +1,4 @@
-"""The poses that were considered, one row each, with what became of them."""
+"""The poses that were considered, one row each, with their outcomes."""
 
 from __future__ import annotations
 

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from reachmap.cell.loading import LoadedCell
     from reachmap.core.robot.model import RobotModel
 
-# Points along the longer and the shorter side; of the orientations every so many.
+# Points along the longer and the shorter side; of the orientations every n-th.
 Grid = tuple[int, int, int]
 COARSE: Grid = (8, 6, 3)
 THIN: Grid = (6, 5, 3)

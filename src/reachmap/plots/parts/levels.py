@@ -72,7 +72,7 @@ def _first_best(*scores: FloatArray) -> tuple[int, int]:
     """Place of the highest first score; the next scores decide among equals."""
     still_in = np.ones(scores[0].shape, dtype=bool)
     for score in scores:
-        # Means of equal numbers may differ in the last bit, which is no difference.
+        # Means of equal numbers may differ in the last bit, which is not a difference.
         rounded = np.where(still_in & ~np.isnan(score), score, -1.0).round(9)
         still_in &= rounded == rounded.max()
     row, column = np.unravel_index(int(still_in.argmax()), still_in.shape)

@@ -61,7 +61,7 @@ def check_document(document: Any) -> Findings:
     -------
     Findings
         Every mistake, not only the first. Objects called ``reachmap``, the results
-        of an earlier ranking, are let pass: they are dropped on reading.
+        of an earlier ranking, are accepted: they are dropped on reading.
     """
     found = Findings()
     if not isinstance(document, dict):

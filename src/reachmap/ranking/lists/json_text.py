@@ -20,7 +20,7 @@ _CONSTANTS = frozenset({"NaN", "Infinity", "-Infinity"})
 
 @dataclass(slots=True)
 class _Findings:
-    """What the parser met that JSON readers usually let pass."""
+    """What the parser met that JSON readers usually accept."""
 
     repeated: bool = False
     not_finite: bool = False

@@ -108,7 +108,7 @@ def _read_bytes(path: str | Path, source: str) -> bytes:
 def _refuse_overrides(
     document: Any, frame: str | None, approach_axis: str | None, source: str
 ) -> None:
-    # What is no such document, or lacks its frame, is reported when it is checked.
+    # What is not such a document, or lacks its frame, is reported when it is checked.
     own = document if isinstance(document, dict) else {}
     stated = (
         ("frame", own.get("frame", frame), frame),

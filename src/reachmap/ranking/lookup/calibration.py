@@ -126,7 +126,7 @@ def read_calibration(path: str | Path, map_sha256: str) -> Calibration:
     if document.get("map_sha256") != map_sha256:
         raise AnotherMapError(
             f"{path}: was made for the map {str(document.get('map_sha256'))[:12]}, not "
-            f"for {map_sha256[:12]}; make it anew with reachmap validate --calibrate"
+            f"for {map_sha256[:12]}; make a new one with reachmap validate --calibrate"
         )
     try:
         return _calibration(document)

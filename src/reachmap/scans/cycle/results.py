@@ -16,7 +16,7 @@ from reachmap.scans.cycle.planning import CyclePlan
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class CycleResults:
-    """What became of the cycles over test grasps.
+    """Outcomes of the cycles over test grasps.
 
     Attributes
     ----------

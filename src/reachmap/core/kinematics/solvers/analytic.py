@@ -2,7 +2,7 @@
 
 EAIK finds all branches of six-axis arms of known structure in microseconds. Left to
 the caller are: rows that do not meet the pose, singular poses (branches are missing
-there, and its least-squares flag is no guide), joint limits and whole turns.
+there, and its least-squares flag cannot be relied on), joint limits and whole turns.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ _ASIDE_RAD = 1e-5
 # at the edge of reach; at a singularity they jump.
 _JUMP_RAD = 0.1
 
-# A pose with so many solutions has all its branches.
+# A pose with this many solutions has all its branches.
 _ALL_BRANCHES = 8
 
 # Share of the self-test above which a pose has no solution if the closed form has none.

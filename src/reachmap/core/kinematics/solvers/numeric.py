@@ -39,7 +39,7 @@ _HOPELESS = 0.4
 _LAST_STEPS = 30
 _PATIENCE = 4
 
-# Poses that are nearly met [m or rad], or met outside the limits only, get so many
+# Poses that are nearly met [m or rad], or met outside the limits only, get this many
 # times the starts again, and steps that stay within the limits. A larger miss is that
 # of a pose out of reach nearly always.
 _HOPEFUL = 1e-3
@@ -119,7 +119,7 @@ class NumericSolver:
     def _round(
         self, T: FloatArray, count: int, *, within: bool = False
     ) -> tuple[Rows, FloatArray]:
-        """Solutions from so many starts, and the least miss of each pose.
+        """Solutions from a number of starts, and the smallest miss of each pose.
 
         With `within`, steps do not leave the limits.
         """
