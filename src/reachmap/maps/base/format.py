@@ -9,11 +9,11 @@ import numpy as np
 
 from reachmap.maps.base.record import BasePlacement
 from reachmap.maps.bytes.tree import Tree
-from reachmap.maps.format.assembly import assemble, provenance_of, run_of, stamp_of
+from reachmap.maps.format.assembly import assemble, origin_of
 from reachmap.maps.format.checks import check_pose, require
 from reachmap.maps.format.layout import JOINT, PERCENT, SCAN, Layout, Variable, index
 from reachmap.maps.format.placement import is_turn
-from reachmap.maps.format.store import load, store
+from reachmap.maps.format.store import RecordFile
 
 PERCENTAGES: Final = {
     "score": "Mean path reachability of the bin; a bound where exact is 0.",
@@ -176,11 +176,6 @@ BASE: Final = Layout(
 )
 
 
-def write_base(path: Path, record: BasePlacement, overwrite: bool = False) -> str:
-    """Write a place of the arm; see :func:`~reachmap.maps.format.store.store`."""
-    return store(path, tree_from_base(record), BASE, overwrite=overwrite)
-
-
 def tree_from_base(record: BasePlacement) -> Tree:
     """Everything that the file will hold."""
     reasons = ("", *sorted(set(record.reason) - {""}))
@@ -211,18 +206,6 @@ def tree_from_base(record: BasePlacement) -> Tree:
     )
 
 
-def read_base(path: Path) -> BasePlacement:
-    """Read a place of the arm; everything about it is checked.
-
-    Raises
-    ------
-    MapFileError
-        The file is missing, damaged, or something else.
-    """
-    tree, _ = load(path, BASE)
-    return base_from_tree(tree, path)
-
-
 def base_from_tree(tree: Tree, path: Path) -> BasePlacement:
     """Turn a checked tree into a record; ``path`` is named in messages."""
     fields: dict[str, Any] = {name: tree.array(name) for name in _ARRAYS}
@@ -243,7 +226,9 @@ def base_from_tree(tree: Tree, path: Path) -> BasePlacement:
         rail=str(tree.attributes["rail"]),
         reason=tuple(str(reasons[code]) for code in tree.array("reason")),
         margin=margin,
-        stamp=stamp_of(tree),
-        provenance=provenance_of(tree, path),
-        run=run_of(tree, path),
+        **origin_of(tree, path),
     )
+
+
+_FILE = RecordFile(layout=BASE, to_tree=tree_from_base, from_tree=base_from_tree)
+write_base, read_base = _FILE.write, _FILE.read

@@ -8,10 +8,10 @@ from typing import Any, Final
 import numpy as np
 
 from reachmap.maps.bytes.tree import Tree
-from reachmap.maps.format.assembly import assemble, provenance_of, run_of, stamp_of
+from reachmap.maps.format.assembly import assemble, origin_of
 from reachmap.maps.format.checks import require
 from reachmap.maps.format.layout import PERCENT, Layout, Variable, coordinate, index
-from reachmap.maps.format.store import load, store
+from reachmap.maps.format.store import RecordFile
 from reachmap.maps.robustness.record import CERTIFICATES, Robustness
 
 _GRASP: Final = ("layer", "y", "x", "orientation")
@@ -153,11 +153,6 @@ _ARRAYS: Final = (
 )  # fmt: skip
 
 
-def write_robustness(path: Path, record: Robustness, overwrite: bool = False) -> str:
-    """Write a record; see :func:`reachmap.maps.format.placement.write_placement`."""
-    return store(path, tree_from_robustness(record), ROBUSTNESS, overwrite=overwrite)
-
-
 def tree_from_robustness(record: Robustness) -> Tree:
     """Everything that the file will hold."""
     return assemble(
@@ -171,18 +166,6 @@ def tree_from_robustness(record: Robustness) -> Tree:
     )
 
 
-def read_robustness(path: Path) -> Robustness:
-    """Read a record; everything about it is checked.
-
-    Raises
-    ------
-    MapFileError
-        The file is missing, damaged, or something else.
-    """
-    tree, _ = load(path, ROBUSTNESS)
-    return robustness_from_tree(tree, path)
-
-
 def robustness_from_tree(tree: Tree, path: Path) -> Robustness:
     """Turn a checked tree into a record; ``path`` is named in messages."""
     fields: dict[str, Any] = {name: tree.array(name) for name in _ARRAYS}
@@ -190,7 +173,11 @@ def robustness_from_tree(tree: Tree, path: Path) -> Robustness:
         **fields,
         margin_m=float(np.float64(tree.attributes["margin_m"])),
         body_pairs=tuple(tree.attributes["body_pairs"]),
-        stamp=stamp_of(tree),
-        provenance=provenance_of(tree, path),
-        run=run_of(tree, path),
+        **origin_of(tree, path),
     )
+
+
+_FILE = RecordFile(
+    layout=ROBUSTNESS, to_tree=tree_from_robustness, from_tree=robustness_from_tree
+)
+write_robustness, read_robustness = _FILE.write, _FILE.read
