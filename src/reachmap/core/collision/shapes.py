@@ -8,11 +8,13 @@ import coal
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
-from reachmap._typing import FloatArray
+from reachmap._typing import BoolArray, FloatArray
 from reachmap.cell.model.shapes import ConvexBody, Solid, TriangleMesh
 
 # A hundredth of what a safety margin usually is.
 FLAT_M = 1e-5
+# Coal counts the neighbours of a corner in a byte, of which it needs some values.
+MOST_NEIGHBOURS = 250
 
 
 def coal_shape(shape: Solid) -> Any:
@@ -47,7 +49,9 @@ def coal_shape(shape: Solid) -> Any:
 def convex_hull(points: FloatArray) -> Any:
     """Convex body around points (n, 3); None where they lie in a plane.
 
-    The hull is scipy's: coal's own is a segmentation fault where there is none.
+    The hull is scipy's: coal's own is a segmentation fault where there is none. Where
+    a corner has more neighbours than coal can count (the tip of a fine cone), every
+    second of them is left out and the rest swollen until it is around all points.
     """
     points = np.asarray(points, float)
     # Below a millionth of the size a body has no inside that an engine could use.
@@ -56,8 +60,11 @@ def convex_hull(points: FloatArray) -> Any:
         return None
     try:
         hull = ConvexHull(points)
+        while (left_out := _crowded(hull)).any():
+            hull = ConvexHull(_swollen(hull, ~left_out, points))
     except QhullError:
         return None
+    points = hull.points
     corners = np.unique(hull.simplices, return_inverse=True)
     vertices, triangles = coal.StdVec_Vec3s(), coal.StdVec_Triangle()
     vertices.extend(list(points[corners[0]]))
@@ -65,3 +72,25 @@ def convex_hull(points: FloatArray) -> Any:
         [coal.Triangle(*map(int, row)) for row in corners[1].reshape(-1, 3)]
     )
     return coal.Convex(vertices, triangles)
+
+
+def _crowded(hull: ConvexHull) -> BoolArray:
+    """Which points of a hull to leave out: of too many neighbours every second."""
+    edges = np.unique(
+        hull.simplices[:, [0, 1, 1, 2, 2, 0, 1, 0, 2, 1, 0, 2]].reshape(-1, 2), axis=0
+    )
+    left_out = np.zeros(len(hull.points), bool)
+    count = np.bincount(edges[:, 0])
+    if count.max() > MOST_NEIGHBOURS:
+        left_out[edges[edges[:, 0] == count.argmax(), 1][::2]] = True
+        left_out[count > MOST_NEIGHBOURS] = False
+    return left_out
+
+
+def _swollen(hull: ConvexHull, kept: BoolArray, points: FloatArray) -> FloatArray:
+    """Some corners of a hull, moved outwards until their hull has all points inside."""
+    corners = hull.points[np.intersect1d(np.flatnonzero(kept), hull.vertices)]
+    centre = corners.mean(axis=0)
+    normal, offset = np.split(ConvexHull(corners - centre).equations, [3], axis=1)
+    beyond = (points - centre) @ normal.T / -offset.T
+    return np.asarray(centre + (corners - centre) * float(beyond.max()))
