@@ -8,13 +8,13 @@ from itertools import product
 
 import numpy as np
 
-from reachmap._typing import BoolArray, FloatArray
+from reachmap._typing import BoolArray, FloatArray, IntArray
 from reachmap.core.collision.bin_fit import BinFit
 from reachmap.core.scene import Scene
 from reachmap.geometry import AXES, transform_from_parts, yaw_transform
+from reachmap.maps.records import NO_PAIR, Status
 from reachmap.maps.summary.nothing import likeliest_cause
 from reachmap.sampling.frames import FrameGrid, approach_distance_m, bin_test_frames
-from reachmap.scans.ik_survey import survey_frames
 from reachmap.tools.trial import reach_of
 
 # A place is taken where this share of a few test grasps can be reached: the walls deny
@@ -25,9 +25,10 @@ TOOLS = (0.0, 0.5, 1.0, 2.0, 3.0)
 # A longer tool is as unusual as this many other places are.
 PLACES_PER_TOOL = 3
 # So many pairs of both are looked at before the best of them is taken.
-MOST = 60
+MOST = 24
 # Height that an arm gets above with most of its configurations, as a quantile.
 LOW = 0.1
+THIN = 3
 POINTS = np.array([[0.0, 0.0], [-0.3, -0.3], [0.3, -0.3], [-0.3, 0.3], [0.3, 0.3]])
 
 
@@ -131,7 +132,11 @@ class _Trial:
             points=p_bin @ T_base_bin[:3, :3].T + T_base_bin[:3, 3],
             orientations=frames.frames.orientations.copy(),
         )
-        self._T = grid.transforms().reshape(-1, 4, 4)
+        T = grid.transforms()
+        # Of the orientations every third, other ones at each point.
+        point, k = np.indices(T.shape[:2])
+        part = min(THIN, T.shape[1])
+        self._T = T[(k + k // part + point) % part == 0]
         self._approach_m = approach_distance_m(cell)
         self._axis, self._sign = AXES[cell.robot.tcp.approach_axis]
 
@@ -150,9 +155,16 @@ class _Trial:
     def why_nothing(self) -> str:
         """Likeliest cause why nothing is met without a tool."""
         scene = self._scene()
-        survey = survey_frames(scene, self._T, self._approach_m)
-        pairs = scene.checker.body_pairs
-        return likeliest_cause(survey.status, survey.blocking_pair, pairs)
+        Q, frame, free = _solutions(scene, self._T)
+        status = np.full(len(self._T), Status.NO_IK, np.uint8)
+        status[frame] = Status.IK_IN_COLLISION
+        status[frame[free]] = Status.APPROACH_BLOCKED
+        pair = np.full(len(self._T), NO_PAIR, np.int64)
+        # One configuration of each: finding every pair takes long.
+        for k, row in zip(*np.unique(frame, return_index=True), strict=True):
+            if status[k] == Status.IK_IN_COLLISION:
+                pair[k] = scene.checker.touching_pairs(Q[row])[0]
+        return likeliest_cause(status, pair, scene.checker.body_pairs)
 
     def _along(self, distance_m: float) -> FloatArray:
         """T_tcp_moved: from the TCP along its approach axis."""
@@ -161,13 +173,20 @@ class _Trial:
         return transform_from_parts(np.eye(3), p)
 
 
-def _free(scene: Scene, T_base_tip: FloatArray) -> BoolArray:
-    """Whether a free configuration meets a pose, (n, 4, 4) to (n,)."""
+def _solutions(
+    scene: Scene, T_base_tip: FloatArray
+) -> tuple[FloatArray, IntArray, BoolArray]:
+    """Configurations that meet poses (n, 4, 4), the poses they meet, which are free."""
     Q, frame = scene.kinematics.solve_many(
         T_base_tip, windings=False, near=scene.scan_configuration
     )
-    free = frame[scene.checker.free_mask(Q)]
-    return np.isin(np.arange(len(T_base_tip)), free)
+    return Q, frame, scene.checker.free_mask(Q)
+
+
+def _free(scene: Scene, T_base_tip: FloatArray) -> BoolArray:
+    """Whether a free configuration meets a pose, (n, 4, 4) to (n,)."""
+    _, frame, free = _solutions(scene, T_base_tip)
+    return np.isin(np.arange(len(T_base_tip)), frame[free])
 
 
 def _places(points: FloatArray) -> Iterator[tuple[Place, float]]:
