@@ -19,12 +19,12 @@ def ring(count: int, z: float) -> np.ndarray:
 @pytest.mark.parametrize("kind", ["cone", "disc", "spindle"])
 def test_fine_cones_and_discs_are_around_their_points(count: int, kind: str) -> None:
     """Every point is inside, and the volume is larger by half a percent at most."""
-    tips = {
-        "cone": [[0.0, 0.0, 1.0]],
+    tips: dict[str, np.ndarray] = {
+        "cone": np.array([[0.0, 0.0, 1.0]]),
         "disc": ring(count, 0.1),
-        "spindle": [[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]],
-    }[kind]
-    points = np.vstack([ring(count, 0.0), tips])
+        "spindle": np.array([[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]]),
+    }
+    points = np.vstack([ring(count, 0.0), tips[kind]])
     body = convex_hull(points)
     corners = np.array([body.point(k) for k in range(body.num_points)])
     found, true = ConvexHull(corners), ConvexHull(points)
