@@ -14,6 +14,7 @@ from tests.support.kinematics_arms import (
     nearest_branch,
     robot,
     serial_urdf,
+    ur5,
 )
 
 QUARTER = np.pi / 2
@@ -153,3 +154,34 @@ def test_a_straight_approach_of_rounded_five_axes_is_followed() -> None:
     path = kinematics.follow(kinematics.solve(T[0], windings=False)[0], T)
     assert path is not None
     assert misses(kinematics.robot, path, T).max() < 2 * kinematics.tolerance
+
+
+class _Fragile:
+    """EAIK that raises at some poses, as it does for intersections at infinity."""
+
+    def __init__(self, robot: object, every: int) -> None:
+        self._robot, self._every, self._asked = robot, every, 0
+
+    def calculate_IK(self, pose: np.ndarray) -> object:
+        self._asked += 1
+        if self._asked % self._every == 0:
+            raise RuntimeError("Intersection point can't be calculated")
+        return self._robot.calculate_IK(pose)  # type: ignore[attr-defined]
+
+
+def test_an_exception_of_eaik_in_a_scan_costs_no_pose() -> None:
+    """Poses at which it raises are solved by the next solver, the others as before."""
+    kinematics = Kinematics(ur5(half_turn=True))
+    arm = kinematics.robot
+    Q = np.random.default_rng(5).uniform(arm.lower_rad, arm.upper_rad, (60, 6))
+    T = kinematics.forward_many(Q)
+    rows = kinematics._solver._rows  # type: ignore[attr-defined]
+    robot = rows._robot
+    rows._robot = _Fragile(robot, 3)
+    try:
+        found, frame = kinematics.solve_many(T)
+    finally:
+        rows._robot = robot
+    assert len(np.unique(frame)) == 60
+    assert misses(arm, found, T[frame]).max() < 1e-9
+    assert (nearest_branch(found, frame, Q) < 1e-6).sum() >= 58

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from eaik.pybindings import EAIK
 
-from reachmap._typing import BoolArray, FloatArray
+from reachmap._typing import BoolArray, FloatArray, IntArray
 from reachmap.core.kinematics.least_squares import least_squares_many
 from reachmap.core.kinematics.nominal import NOMINAL_ARMS, rounded_arm
 from reachmap.core.kinematics.refine import matrix_difference
@@ -78,15 +78,27 @@ class EaikRows:
 
     def __call__(self, T: FloatArray) -> Rows:
         """Rows of all poses, least-squares ones included, (n, 4, 4) to a table."""
-        solve = self._robot.calculate_IK
-        found = [solve(pose).Q for pose in T]
-        counts = [len(rows) for rows in found]
+        return self.with_refused(T)[0]
+
+    def with_refused(self, T: FloatArray) -> tuple[Rows, IntArray]:
+        """The rows, and the poses at which EAIK raised an exception, and gives none."""
+        found = [self._at(pose) for pose in T]
+        refused = np.flatnonzero([rows is None for rows in found])
+        counts = [0 if rows is None else len(rows) for rows in found]
         frame = np.repeat(np.arange(len(T)), counts)
         # Without solutions EAIK's array may lack columns as well as rows.
-        some = [rows[:, : self._dof] for rows in found if len(rows)]
+        some = [
+            rows[:, : self._dof] for rows in found if rows is not None and len(rows)
+        ]
         Q = np.concatenate([np.zeros((0, self._dof)), *some])
         finite = np.isfinite(Q).all(axis=1)
-        return Q[finite] * self._signs, frame[finite]
+        return (Q[finite] * self._signs, frame[finite]), refused
+
+    def _at(self, pose: FloatArray) -> FloatArray | None:
+        try:
+            return np.asarray(self._robot.calculate_IK(pose).Q)
+        except (RuntimeError, ValueError, IndexError):
+            return None
 
     @property
     def is_known(self) -> bool:
@@ -169,10 +181,7 @@ def _candidates(chain: SerialChain, like: ClosedForm | None) -> Iterator[ClosedF
 
 
 def _count(form: ClosedForm, chain: SerialChain, count: int, tolerance: float) -> int:
-    try:
-        return int(_found_again(form, chain, count, tolerance).sum())
-    except (RuntimeError, ValueError):  # EAIK: not of this structure after all
-        return 0
+    return int(_found_again(form, chain, count, tolerance).sum())
 
 
 def _found_again(

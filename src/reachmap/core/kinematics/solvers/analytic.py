@@ -119,16 +119,19 @@ class AnalyticSolver:
         tables = []
         for start in range(0, len(T), _BLOCK):
             poses = T[start : start + _BLOCK]
-            raw = self._rows(poses)
+            raw, refused = self._rows.with_refused(poses)
             rows = self._with_singular(self._meeting(raw, poses), raw, poses)
-            if self._form.score < _TRUSTED * SELF_TESTS:
-                rows = self._with_lost(rows, poses)
+            trusted = self._form.score >= _TRUSTED * SELF_TESTS
+            rows = self._with_lost(rows, poses, refused if trusted else None)
             tables.append((rows[0], rows[1] + start))
         return joined(tables, self._chain.dof)
 
-    def _with_lost(self, rows: Rows, T: FloatArray) -> Rows:
-        """Seek numerically what the closed form may have lost."""
+    def _with_lost(self, rows: Rows, T: FloatArray, among: IntArray | None) -> Rows:
+        """Seek numerically what the closed form may have lost, at some poses or all."""
         missing = np.ones(len(T), bool)
+        if among is not None:
+            missing[:] = False
+            missing[among] = True
         missing[rows[1]] = False
         frames = np.flatnonzero(missing)
         if not len(frames):
