@@ -6,7 +6,7 @@ import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -48,7 +48,7 @@ from reachmap.placement.settings import placement_settings
 from reachmap.placement.summary import best_rows, placement_facts, row_facts
 from reachmap.placement.supports import supports_in
 from reachmap.placement.tolerance import Tolerance
-from reachmap.placement.tool_limit import tool_limit
+from reachmap.placement.tool_limit import ToolLimit, tool_limit
 from reachmap.runtime.options import IN_PROCESS, RunOptions
 from reachmap.runtime.progress import Progress
 from reachmap.scans.document import (
@@ -321,6 +321,22 @@ def _decide(question: Question, choice: PlacementChoice) -> Decision:
     return decide_by_search(question, choice.top)
 
 
+def _settings(
+    placed: LoadedCell, outcome: Outcome, choice: PlacementChoice, limit: ToolLimit
+) -> dict[str, Any]:
+    """What the placement depends on, and the limit of the tool."""
+    return placement_settings() | {
+        "top": choice.top,
+        "limits": {k: list(v) for k, v in choice.limits.items()},
+        "fixed": dict(choice.fixed),
+        "scan_configuration": "new" if outcome.scan.is_new else "kept",
+        "figure": FIGURES[placed.cell.tool.roll != LISTED],
+        "tool_limit_percent": round(limit.percent, 2),
+        "tool_limit_body": limit.body,
+        "tool_limit_gains": limit.gains,
+    }
+
+
 def _record(
     question: Question,
     decision: Decision,
@@ -346,17 +362,7 @@ def _record(
         settings={
             **checking_settings(scene),
             "roadmap": placed.cell.roadmap.model_dump(mode="json"),
-            "placement": placement_settings()
-            | {
-                "top": choice.top,
-                "limits": {k: list(v) for k, v in choice.limits.items()},
-                "fixed": dict(choice.fixed),
-                "scan_configuration": "new" if outcome.scan.is_new else "kept",
-                "figure": FIGURES[placed.cell.tool.roll != LISTED],
-                "tool_limit_percent": round(limit.percent, 2),
-                "tool_limit_body": limit.body,
-                "tool_limit_gains": limit.gains,
-            },
+            "placement": _settings(placed, outcome, choice, limit),
         },
         source_sha256=question.workspace.stamp.content_sha256,
     )
