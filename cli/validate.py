@@ -33,6 +33,13 @@ if TYPE_CHECKING:
     help="Attempts at each grasp; by default as many as the map has.",
 )
 @click.option(
+    "--attempts",
+    type=click.Choice(["roadmap", "planner"]),
+    help="roadmap: over two roadmaps made for the grasps, with other seeds; planner: "
+    "from scratch each time with the cell's planner, as in the paper; default: the "
+    "map's.",
+)
+@click.option(
     "--rolls",
     type=click.IntRange(1, 360),
     default=24,
@@ -69,6 +76,7 @@ def command(
     grasps: tuple[str, ...],
     random: int | None,
     repeats: int | None,
+    attempts: str | None,
     rolls: int,
     top: int,
     format_name: str | None,
@@ -100,6 +108,8 @@ def command(
         options.unused("format_name", "frame", because="needs GRASPS")
     if output is None and chart is None and not calibrate:
         options.unused("overwrite", because="needs --output, --chart or --calibrate")
+    if attempts is not None:
+        overrides = (*overrides, f"bin_scan.attempts={attempts}")
     from reachmap.cli.text.validate import validation_text
     from reachmap.tools.rank import ListFormat
     from reachmap.tools.validate import PickOptions, validate

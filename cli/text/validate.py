@@ -51,9 +51,11 @@ def validation_text(validation: Validation) -> str:
 def _headline(validation: Validation) -> str:
     said = validation.settings
     grasps = plural(validation.overall.grasps, "grasp")
+    over = said["attempts"] == "roadmap"
+    how = "over a roadmap of their own" if over else f"with {said['planner']}"
     return (
         f"{said['map']} against planning: {grasps}, "
-        f"{plural(int(said['repeats']), 'attempt')} each with {said['planner']}, "
+        f"{plural(int(said['repeats']), 'attempt')} each {how}, "
         f"{plural(int(said['rolls']), 'roll')} where free, seed {said['seed']}"
     )
 

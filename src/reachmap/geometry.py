@@ -195,3 +195,25 @@ def yaw_transform(x: float, y: float, z: float, yaw_rad: float) -> FloatArray:
     c, s = np.cos(yaw_rad), np.sin(yaw_rad)
     R = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
     return transform_from_parts(R, np.array([x, y, z]))
+
+
+def pieces(path: FloatArray, longest: float) -> FloatArray:
+    """Points of a polyline and points between them, no further apart than ``longest``.
+
+    Parameters
+    ----------
+    path : array, shape (n, k)
+    longest : float
+        In the unit of the path.
+
+    Returns
+    -------
+    array, shape (m, k)
+        The points of the path are among them.
+    """
+    parts = [path[:1]]
+    for q_from, q_to in zip(path[:-1], path[1:], strict=True):
+        count = max(1, int(np.ceil(np.linalg.norm(q_to - q_from) / longest)))
+        shares = np.arange(1, count + 1)[:, None] / count
+        parts.append(q_from + shares * (q_to - q_from))
+    return np.vstack(parts)

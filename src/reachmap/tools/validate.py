@@ -35,6 +35,7 @@ from reachmap.validation.judgement import judge_list
 from reachmap.validation.picks import NO_PICKS, join_picks, picks_of
 from reachmap.validation.planning import PickContext, PickResults, plan_picks
 from reachmap.validation.random_grasps import random_grasps
+from reachmap.validation.routes import plan_picks_over_routes
 from reachmap.validation.summary import Validation, summarise
 
 DEFAULT_ROLLS = 24
@@ -149,7 +150,9 @@ def validate(
     if not len(context.picks):
         raise GraspListError("there are no grasps to plan to")
     context = replace(context, body_pairs=tuple(pairs_of_fillings(context.loaded)))
-    results = plan_picks(context, run, progress=Progress("validate", quiet=run.quiet))
+    attempts = _attempts(context)
+    measure = plan_picks_over_routes if attempts == "roadmap" else plan_picks
+    results = measure(context, run, progress=Progress("validate", quiet=run.quiet))
     validation = summarise(
         [
             judge_list(label, one, ranker, bin_map, part)
@@ -161,6 +164,7 @@ def validate(
         settings={
             **_facts_of_settings(map_path, bin_map, settings, context, top),
             **dataclasses.asdict(ranker.table.basis),
+            "attempts": attempts,
         },
     )
     if calibration is not None:
@@ -172,10 +176,26 @@ def validate(
     )
 
 
+def _attempts(context: PickContext) -> str:
+    """How grasps are planned to."""
+    spec = context.loaded.cell.bin_scan
+    if spec.attempts == "roadmap" and spec.is_filled:
+        logger.warning(
+            "scanned at levels of filling: each grasp is planned to from scratch, "
+            "with the bin filled up to it, not over a roadmap"
+        )
+        return "planner"
+    return spec.attempts
+
+
 def _context(bin_map: BinMap, map_name: str, pick: PickOptions) -> PickContext:
-    """How to plan, with no grasps yet."""
+    """How to plan, with no grasps yet: as the map was made, unless told otherwise."""
+    overrides = pick.overrides
+    if "attempts" not in bin_map.provenance.settings:
+        # Older maps say nothing about attempts: they were all the planner's.
+        overrides = ("bin_scan.attempts=planner", *overrides)
     return PickContext(
-        loaded=cell_of_artefact(bin_map.provenance, map_name, pick.overrides),
+        loaded=cell_of_artefact(bin_map.provenance, map_name, overrides),
         picks=NO_PICKS,
         rolls=pick.rolls,
         repeats=pick.repeats or bin_map.path_found.shape[-1],

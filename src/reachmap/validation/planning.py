@@ -107,7 +107,11 @@ def plan_picks(
 ) -> PickResults:
     """Plan to every grasp; verdicts do not depend on the number of workers."""
     job = Job(function=plan_unit, context=context)
-    payloads = run(job, range(len(context.picks)), options, progress)
+    return joined_results(run(job, range(len(context.picks)), options, progress))
+
+
+def joined_results(payloads: Sequence[dict[str, Any]]) -> PickResults:
+    """Results of consecutive grasps, put together."""
     return PickResults(
         **{
             name: np.concatenate([payload[name] for payload in payloads])
@@ -119,14 +123,9 @@ def plan_picks(
 def plan_unit(context: PickContext, pick: int) -> dict[str, Any]:
     """Plan to one grasp."""
     scene = Scene.shared(context.cell_for(pick), with_bin=True)
-    T = tool_poses(
-        context.picks,
-        pick,
-        rolls=context.rolls,
-        approach_axis=scene.loaded.cell.robot.tcp.approach_axis,
-    )
+    survey = survey_of_pick(context, scene, pick)
     key = (context.seed, int(context.picks.number[pick]))
-    results = plan_pick(scene, T, key, context.repeats)
+    results = plan_pick(scene, survey, key, context.repeats)
     number = {name: k for k, name in enumerate(context.body_pairs)}
     names = scene.checker.body_pairs
     pairs = [
@@ -138,8 +137,20 @@ def plan_unit(context: PickContext, pick: int) -> dict[str, Any]:
     )
 
 
+def survey_of_pick(context: PickContext, scene: Scene, pick: int) -> Survey:
+    """Goals of the tool poses of one grasp, the recommended one first."""
+    cell = scene.loaded.cell
+    T = tool_poses(
+        context.picks,
+        pick,
+        rolls=context.rolls,
+        approach_axis=cell.robot.tcp.approach_axis,
+    )
+    return survey_frames(scene, T, approach_distance_m(cell))
+
+
 def plan_pick(
-    scene: Scene, T_base_tcp: FloatArray, key: tuple[int, int], repeats: int
+    scene: Scene, survey: Survey, key: tuple[int, int], repeats: int
 ) -> PickResults:
     """Make all attempts at one grasp, as a picking loop would.
 
@@ -149,8 +160,8 @@ def plan_pick(
     Parameters
     ----------
     scene : Scene
-    T_base_tcp : array, shape (m, 4, 4)
-        Tool poses, the recommended one first.
+    survey : Survey
+        Of its tool poses.
     key : (int, int)
         Seed, and number of the grasp.
     repeats : int
@@ -160,8 +171,6 @@ def plan_pick(
     PickResults
         A single row.
     """
-    approach_m = approach_distance_m(scene.loaded.cell)
-    survey = survey_frames(scene, T_base_tcp, approach_m)
     meter = Meter(scene)
     measured = np.full((1, repeats, len(MEASURED)), np.nan)
     pose = np.full((1, repeats), -1)
@@ -178,7 +187,7 @@ def plan_pick(
     return PickResults(
         status=np.array([status], np.uint8),
         blocking_pair=np.array([pair]),
-        poses=np.array([len(T_base_tcp)]),
+        poses=np.array([len(survey.status)]),
         poses_free=np.array([len(free)]),
         recommended_free=np.array([0 in free], np.uint8),
         found=(pose >= 0).astype(np.uint8),

@@ -9,11 +9,11 @@ from reachmap.cell.model.roadmap import RoadmapSpec
 from reachmap.core.planning.motion import MotionChecker
 from reachmap.core.planning.routes import (
     RouteNetwork,
-    pieces,
     shorten_until,
     spread_over,
 )
 from reachmap.core.planning.timing import path_length_rad
+from reachmap.geometry import pieces
 
 START, GOAL = np.array([-2.0, 0.0]), np.array([2.0, 0.0])
 SHORTEST = 2 * np.sqrt(3) + np.pi / 3
@@ -37,6 +37,8 @@ class PlaneWithDisc(MotionChecker):
         length_sq = change @ change
         along = 0.0 if length_sq == 0 else np.clip(-q_from @ change / length_sq, 0, 1)
         return bool(np.linalg.norm(q_from + along * change) >= 1.0)
+
+    is_free = is_verified
 
     def path_is_free(self, path):
         """Whether no segment enters the disc."""

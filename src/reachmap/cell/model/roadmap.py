@@ -40,7 +40,7 @@ class RoadmapSpec(Record):
         "reached ones near its goals.",
     )
     samples: int = Field(
-        3000,
+        10000,
         ge=0,
         le=10**6,
         description="Configurations of the lazy roadmap around what stays open.",

@@ -9,10 +9,14 @@ import pinocchio as pin
 
 from reachmap._typing import BoolArray, FloatArray, IntArray
 from reachmap.core.collision.checker import CollisionChecker, guess_nothing
+from reachmap.geometry import pieces
 
 TOLERANCE_M, TOLERANCE_SHARE = 1e-3, 0.1
 """By how much, or by what share of itself if that is more, a clearance may be greater
 than the least there is anywhere on the path. Half as much takes twice the time."""
+
+# Short enough for the bound from where the robot is to be near to the truth.
+PIECE_RAD = 0.2
 
 
 def certain_clearance_m(clearance_m: FloatArray) -> FloatArray:
@@ -24,8 +28,8 @@ def certain_clearance_m(clearance_m: FloatArray) -> FloatArray:
 class ClearanceMeter:
     """Measures the distances of the bodies that a checker checks.
 
-    A distance is that of the convex hulls where it is not the least so far, and that of
-    the bodies themselves where it might be: hulls are never further apart.
+    A distance is that of the convex hulls, and that of the bodies themselves where it
+    may be the least by more than the tolerance: hulls are never further apart.
 
     Parameters
     ----------
@@ -43,6 +47,8 @@ class ClearanceMeter:
             guess_nothing(data.distanceRequests)
         pairs = self._bodies.collisionPairs
         self._has_mesh = np.array([self._differs(pair) for pair in pairs], bool)
+        self._first = np.array([pair.first for pair in pairs], np.int64)
+        self._second = np.array([pair.second for pair in pairs], np.int64)
 
     def of_path(
         self, path: FloatArray, among: BoolArray | None = None
@@ -72,40 +78,69 @@ class ClearanceMeter:
         if len(pairs) == 0:
             return float("nan"), -1
         self._least, self._pair = np.inf, -1
+        Q, travel = self._pieces(path)
         # The last way-point, at the grasp, is the narrowest as a rule. Pairs that are
         # not looked at are as far apart as can be.
-        d = self._distances(path[-1], pairs, np.full(count, np.inf))
-        for k in range(len(path) - 1, 0, -1):
-            known = d - self._moved(path[k - 1], path[k])
-            d_before = self._distances(path[k - 1], self._near(known), known)
-            self._halve(path[k - 1], path[k], d_before, d)
-            d = d_before
+        d_last = self._distances(Q[-1], pairs, np.full(count, np.inf))
+        known = d_last - travel[-1]
+        d_first = self._distances(Q[0], self._near(known), known)
+        place, d = np.array([0.0, len(Q) - 1.0]), np.stack([d_first, d_last])
+        while len(Q) > 1:
+            place, d_refined = self._halve(Q, travel, place, d)
+            if len(d_refined) == len(d):
+                break
+            d = d_refined
         return float(self._least), int(self._checker.pair_index[self._pair])
 
-    def _halve(
-        self, q_from: FloatArray, q_to: FloatArray, d_from: FloatArray, d_to: FloatArray
-    ) -> None:
-        """Look at the middle of a motion, unless it cannot be narrower anywhere."""
-        waiting = [(q_from, q_to, d_from, d_to)]
-        while waiting:
-            a, b, d_a, d_b = waiting.pop()
-            # A pair that moves by r on the way is nowhere nearer than this.
-            least = 0.5 * (d_a + d_b - self._moved(a, b))
-            near = self._near(least)
-            if not len(near):
-                continue
-            middle = 0.5 * (a + b)
-            d_middle = self._distances(middle, near, least)
-            waiting += [(a, middle, d_a, d_middle), (middle, b, d_middle, d_b)]
+    def _pieces(self, path: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Short pieces of a path, and how far each pair has moved by their ends.
 
-    def _moved(self, q_from: FloatArray, q_to: FloatArray) -> FloatArray:
-        """Bound on how far a motion moves each pair [m]."""
-        return np.asarray(self._checker.pair_reach_m @ np.abs(q_to - q_from))
+        Returns
+        -------
+        Q : array, shape (ends, dof)
+        travel_m : array, shape (ends, pairs)
+            Bound on the way of the bodies against each other, from the first end.
+        """
+        Q = pieces(path, PIECE_RAD)
+        half = 0.5 * np.diff(Q, axis=0)
+        each = self._checker.bound.of_bodies_m(Q[:-1] + half, half)
+        both = each[:, self._first] + each[:, self._second]
+        moved = 2.0 * np.minimum(both, np.abs(half) @ self._checker.pair_reach_m.T)
+        start = np.zeros((1, moved.shape[1]))
+        return Q, np.concatenate([start, np.cumsum(moved, axis=0)])
+
+    def _halve(
+        self, Q: FloatArray, travel: FloatArray, place: FloatArray, d: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Look at the middle of each stretch that may be narrower somewhere.
+
+        ``place`` counts pieces, the rows of ``d`` are distances there or bounds; both
+        come back with rows in between.
+        """
+        moved = np.diff(_at(travel, place), axis=0)
+        # A pair that moves by r on the way is nowhere nearer than this.
+        least = 0.5 * (d[:-1] + d[1:] - moved)
+        nearest = least.min(axis=1)
+        wide = np.flatnonzero(nearest < self._allowed())
+        middle = 0.5 * (place[wide] + place[wide + 1])
+        q_middle = _at(Q, middle)
+        gone = _at(travel, middle) - _at(travel, place[wide])
+        d_middle = np.maximum(d[wide] - gone, d[wide + 1] - (moved[wide] - gone))
+        for k in np.argsort(nearest[wide], kind="stable").tolist():
+            near = self._near(least[wide[k]])
+            if len(near):
+                d_middle[k] = self._distances(q_middle[k], near, d_middle[k])
+        return np.insert(place, wide + 1, middle), np.insert(d, wide + 1, d_middle, 0)
+
+    def _allowed(self) -> float:
+        """What is not narrower than this need not be looked at."""
+        if np.isinf(self._least):
+            return np.inf
+        return float(self._least - max(TOLERANCE_M, TOLERANCE_SHARE * self._least))
 
     def _near(self, least: FloatArray) -> IntArray:
         """Pairs that may be narrower than all so far, by more than is allowed."""
-        allowed = max(TOLERANCE_M, TOLERANCE_SHARE * self._least)
-        return np.flatnonzero(least < self._least - allowed)
+        return np.flatnonzero(least < self._allowed())
 
     def _distances(
         self, q: FloatArray, pairs: IntArray, known: FloatArray
@@ -118,16 +153,23 @@ class ClearanceMeter:
         distance = known.copy()
         for k in pairs.tolist():
             distance[k] = self._measure(self._hulls, self._hulls_data, k)
-        closest = pairs[self._has_mesh[pairs] & (distance[pairs] < self._least)]
-        if len(closest):
-            pin.updateGeometryPlacements(
-                self._model, self._data, self._bodies, self._bodies_data, q_bodies
-            )
-        order = pairs[np.argsort(distance[pairs], kind="stable")].tolist()
-        for k in order:
+        is_placed = False
+        for k in pairs[np.argsort(distance[pairs], kind="stable")].tolist():
             if distance[k] >= self._least:
                 break
             if self._has_mesh[k]:
+                # The true bodies take a hundred times as long.
+                if distance[k] >= self._allowed():
+                    continue
+                if not is_placed:
+                    pin.updateGeometryPlacements(
+                        self._model,
+                        self._data,
+                        self._bodies,
+                        self._bodies_data,
+                        q_bodies,
+                    )
+                    is_placed = True
                 exact = self._measure(self._bodies, self._bodies_data, k)
                 distance[k] = max(distance[k], exact)
             if distance[k] < self._least:
@@ -144,3 +186,10 @@ class ClearanceMeter:
             is not type(self._hulls.geometryObjects[body].geometry)
             for body in (pair.first, pair.second)
         )
+
+
+def _at(values: FloatArray, place: FloatArray) -> FloatArray:
+    """Rows of values (n, k) between which a place lies, interpolated."""
+    row = np.minimum(place.astype(np.int64), len(values) - 2)
+    share = (place - row)[:, None]
+    return np.asarray(values[row] + share * (values[row + 1] - values[row]))

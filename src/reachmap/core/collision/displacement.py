@@ -67,11 +67,13 @@ class MotionBound:
         reach_m: FloatArray,
     ) -> None:
         self._chain = chain
-        self._reach_m = reach_m
+        self._bounds, self._reach_m = bounds, reach_m
         self._corners = _corners_by_joint(chain, robot.model, bodies)
+        parents = [g.parentJoint for g in bodies.geometry.geometryObjects]
+        self._joint = np.array(parents, np.int64) - 1
         # Of bodies beside the chain nothing better is known than R.
-        beside = [g.parentJoint > chain.dof for g in bodies.geometry.geometryObjects]
-        self._beside_m = bounds[beside].max(axis=0, initial=0.0)
+        self._beside = self._joint >= chain.dof
+        self._beside_m = bounds[self._beside].max(axis=0, initial=0.0)
 
     def displacement_m(self, Q: FloatArray, half_change: FloatArray) -> FloatArray:
         """Bound for motions ``Q[k] ± half_change``, any part of them included.
@@ -87,10 +89,32 @@ class MotionBound:
             For the part of relative size f of the motion, f times this holds about
             the part's own middle.
         """
+        first = self._speed_m(Q, half_change).max(axis=1)
+        size = np.abs(half_change)
+        second = size[self._chain.is_revolute].sum() * float(size @ self._reach_m)
+        return np.asarray(np.maximum(first + second, size @ self._beside_m))
+
+    def of_bodies_m(self, Q: FloatArray, half_change: FloatArray) -> FloatArray:
+        """The same for each body, shape (n, bodies), of motions ``Q ± half_change``.
+
+        Both are of shape (n, dof).
+        """
+        size = np.abs(half_change)
+        reach = size @ self._bounds.T
+        turned = size[:, self._chain.is_revolute].sum(axis=1, keepdims=True)
+        first = self._speed_m(Q, half_change)
+        on_chain = np.where(self._beside, 0, self._joint)
+        moved = np.minimum(first[:, on_chain] + turned * reach, reach)
+        return np.asarray(np.where(self._beside, reach, moved))
+
+    def _speed_m(self, Q: FloatArray, half_change: FloatArray) -> FloatArray:
+        """Fastest point on each joint at the middles of motions, shape (n, dof)."""
         frames = self._chain.joint_frames_many(Q)
         origin, axis = frames[..., :3, 3], frames[..., :3, 2]
-        turning = axis * np.where(self._chain.is_revolute, half_change, 0.0)[:, None]
-        sliding = axis * np.where(self._chain.is_revolute, 0.0, half_change)[:, None]
+        change = np.broadcast_to(half_change, Q.shape)[..., None]
+        is_revolute = self._chain.is_revolute[:, None]
+        turning = axis * np.where(is_revolute, change, 0.0)
+        sliding = axis * np.where(is_revolute, 0.0, change)
         # Velocity of a point X on joint k: Σ_{j ≤ k} (a_j × (X − o_j)) Δ_j.
         angular = np.cumsum(turning, axis=1)
         linear = np.cumsum(sliding + _cross(origin, turning), axis=1)
@@ -102,10 +126,7 @@ class MotionBound:
         square = (ux + wy * z - wz * y) ** 2
         square += (uy + wz * x - wx * z) ** 2
         square += (uz + wx * y - wy * x) ** 2
-        first = np.sqrt(square.max(axis=(1, 2)))
-        size = np.abs(half_change)
-        second = size[self._chain.is_revolute].sum() * float(size @ self._reach_m)
-        return np.asarray(np.maximum(first + second, size @ self._beside_m))
+        return np.asarray(np.sqrt(square.max(axis=2)))
 
 
 def _cross(a: FloatArray, b: FloatArray) -> FloatArray:

@@ -21,10 +21,11 @@ from reachmap._typing import BoolArray, FloatArray, IntArray
 from reachmap.cell.model.planner import PlannerSpec, SimplificationSpec
 from reachmap.cell.model.roadmap import RoadmapSpec
 from reachmap.core.kinematics.windings import TURN_RAD, Windings
-from reachmap.core.planning.candidates import CandidateMotions, NearestNeighbours
+from reachmap.core.planning.candidates import CandidateMotions
 from reachmap.core.planning.exploring import (
     Explorer,
     KnownMotions,
+    NearestReached,
     components_of_open_goals,
 )
 from reachmap.core.planning.lazy_prm import LazySamples
@@ -36,6 +37,12 @@ from reachmap.core.planning.roadmap import START, Goals, Roadmap
 # near by, which finds most of what is easy, and for the two at each component, of which
 # there are many where something is unreachable. Chosen on six hard cells, by checks.
 _LEAST, _FEW, _SOME = 0.05, 0.1, 0.2
+# Where more than this share of the frames is open, a search so many times as long: one
+# passage may open all of it. Of six searches into a cage two end within 20,000 checks,
+# the other four between 24,000 and 39,000.
+_MUCH, _LONG = 0.1, 3
+# What the components that are open at the end share among them, if they are few.
+_LAST = 2.0
 # Where many components stay open, so many searches of samples have their full budget,
 # and the others, which are smaller, a part of it.
 _FULL_SEARCHES, _LEAST_SHARE = 3, 8
@@ -143,7 +150,7 @@ class _Connector:
         self._order = list(range(len(spec.planners)))
         self._samples: LazySamples | None = None
         self._sample_checks_left = _FULL_SEARCHES * spec.sample_checks
-        self._nearest = _NearestReached(roadmap, self._Q, self._weight, windings)
+        self._nearest = NearestReached(roadmap, self._Q, self._weight, windings)
         self._candidates = CandidateMotions.of(self._Q, self._weight, windings, spec)
         self._known = KnownMotions(motions, len(self._Q))
         self._explorer = Explorer(
@@ -168,7 +175,12 @@ class _Connector:
         self._each_open(lambda part: self._plan_to(part, few, several))
         self._each_open(self._search_samples)
         self._each_open(self._join_straight)
-        self._each_open(lambda part: self._plan_to(part, some, starts=1))
+        self._each_open(lambda part: self._plan_to(part, some, several))
+        last = min(1.0, max(_SOME, _LAST / max(1, len(self._open))))
+        self._each_open(lambda part: self._plan_to(part, self._share(last), starts=1))
+        # New samples: half of them lie around what is still open, which is less now.
+        self._samples = None
+        self._each_open(self._search_samples)
 
     def _share(self, share: float) -> int:
         return max(1, int(self._spec.max_checks * share))
@@ -205,9 +217,22 @@ class _Connector:
                 self._join_straight(attempt)
                 or self._plan(attempt, self._order[0], least, several)
                 or self._plan_to(attempt, self._spec.max_checks, starts=1)
+                or self._search_long(attempt)
             ):
                 return
             attempt = self._component(np.zeros(0, np.int64))
+
+    def _search_long(self, part: _Component) -> bool:
+        """Plan once more, for longer, where much is at stake."""
+        done = self._roadmap.frame_reached
+        frames = np.unique(self._roadmap.goals.frame)
+        if np.mean(~done[frames]) <= _MUCH:
+            return False
+        budget, spec = _LONG * self._spec.max_checks, self._spec
+        # A search that is begun anew gains little from more of the same.
+        anew = [spec.planners[m] not in _RESTARTS for m in range(len(spec.planners))]
+        order = sorted(range(len(anew)), key=anew.__getitem__)
+        return any(self._plan(part, m, budget, 1) for m in order)
 
     def _each_open(self, attempt: Callable[[_Component], bool]) -> None:
         """Try each open component; what is reached in passing is left out."""
@@ -294,7 +319,7 @@ class _Connector:
                 self._motions,
                 self._windings,
                 self._spec,
-                np.random.default_rng([self._seed, 1 << 20]),
+                np.random.default_rng([self._seed, 1 << 20, self._plans]),
             )
         part.attempts += 1
         most, before = self._spec.sample_checks, self._motions.checker.checks
@@ -333,32 +358,6 @@ class _Connector:
         distance, node = self._nearest.distance[nodes], self._nearest.node[nodes]
         order = np.argsort(distance, kind="stable")[: self._spec.straight_tries]
         return nodes[order], node[order]
-
-
-class _NearestReached:
-    """The reached node nearest to each goal, kept up to date as nodes are reached."""
-
-    def __init__(
-        self, roadmap: Roadmap, Q: FloatArray, weight: FloatArray, windings: Windings
-    ) -> None:
-        self._roadmap, self._Q = roadmap, Q
-        self._weight, self._windings = weight, windings
-        self._seen = 0
-        self.distance = np.full(len(Q), np.inf)
-        self.node = np.full(len(Q), START, np.int64)
-
-    def look_at(self, nodes: IntArray) -> None:
-        """Take in what was reached since, for the goals that are still open."""
-        reached = np.array(self._roadmap.reached[self._seen :], np.int64)
-        if not len(reached):
-            return
-        self._seen = len(self._roadmap.reached)
-        new = np.array([self._roadmap.configurations[k] for k in reached])
-        tree = NearestNeighbours(new, self._weight, self._windings)
-        distance, row = (found[:, 0] for found in tree.of(self._Q[nodes], 1))
-        nearer = distance < self.distance[nodes]
-        self.distance[nodes[nearer]] = distance[nearer]
-        self.node[nodes[nearer]] = reached[row[nearer]]
 
 
 class _Meter:

@@ -9,7 +9,11 @@ import numpy as np
 
 from reachmap._typing import FloatArray, IntArray
 from reachmap.core.kinematics.windings import TURN_RAD, Windings
-from reachmap.core.planning.candidates import CandidateMotions, UnionFind
+from reachmap.core.planning.candidates import (
+    CandidateMotions,
+    NearestNeighbours,
+    UnionFind,
+)
 from reachmap.core.planning.motion import MotionChecker
 from reachmap.core.planning.roadmap import START, Roadmap
 
@@ -182,6 +186,32 @@ class Explorer:
             self._number_of_turns[key] = len(self._known_turns)
             self._known_turns.append(turns)
         return self._number_of_turns[key]
+
+
+class NearestReached:
+    """The reached node nearest to each goal, kept up to date as nodes are reached."""
+
+    def __init__(
+        self, roadmap: Roadmap, Q: FloatArray, weight: FloatArray, windings: Windings
+    ) -> None:
+        self._roadmap, self._Q = roadmap, Q
+        self._weight, self._windings = weight, windings
+        self._seen = 0
+        self.distance = np.full(len(Q), np.inf)
+        self.node = np.full(len(Q), START, np.int64)
+
+    def look_at(self, nodes: IntArray) -> None:
+        """Take in what was reached since, for the goals that are still open."""
+        reached = np.array(self._roadmap.reached[self._seen :], np.int64)
+        if not len(reached):
+            return
+        self._seen = len(self._roadmap.reached)
+        new = np.array([self._roadmap.configurations[k] for k in reached])
+        tree = NearestNeighbours(new, self._weight, self._windings)
+        distance, row = (found[:, 0] for found in tree.of(self._Q[nodes], 1))
+        nearer = distance < self.distance[nodes]
+        self.distance[nodes[nearer]] = distance[nearer]
+        self.node[nodes[nearer]] = reached[row[nearer]]
 
 
 def components_of_open_goals(

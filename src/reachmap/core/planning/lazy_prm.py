@@ -22,6 +22,8 @@ from reachmap.core.planning.roadmap import Roadmap
 
 # Spread of the samples around an open goal, from the width of a gap to the next room.
 _AROUND_RAD = (0.05, 1.0)
+# So many times the neighbours, one after another, while motions run out too soon.
+_WIDER = (1, 4)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -110,22 +112,25 @@ class LazySamples:
         limit = checker.checks + checks
         connected = self._connected()
         before = {int(node): -1 for node in members}
+        reached = dict.fromkeys(before, 0.0)
         # Towards what is connected (A*): the estimate is the straight distance.
         left = self._distances_to(np.array(sorted(connected)))
-        pending: list[tuple[float, float, int, int]] = []
-        for node in before:
-            self._push(pending, 0.0, node, left)
-        while pending and checker.checks < limit:
-            _, distance, node, previous = heapq.heappop(pending)
-            if node in before or not self._is_verified(previous, node):
-                continue
-            before[node] = previous
-            if node in connected:
-                way = self._turned_path(connected[node], node, before)
-                if way is not None:
-                    return way
-                continue
-            self._push(pending, distance, node, left)
+        for wider in _WIDER:
+            # Out of motions, it looks further around everything it has come to.
+            pending: list[tuple[float, float, int, int]] = []
+            for node, distance in reached.items():
+                self._push(pending, distance, node, left, wider)
+            while pending and checker.checks < limit:
+                _, distance, node, previous = heapq.heappop(pending)
+                if node in before or not self._is_verified(previous, node):
+                    continue
+                before[node], reached[node] = previous, distance
+                if node in connected:
+                    way = self._turned_path(connected[node], node, before)
+                    if way is not None:
+                        return way
+                    continue
+                self._push(pending, distance, node, left, wider)
         return None
 
     def _connected(self) -> dict[int, int]:
@@ -151,11 +156,13 @@ class LazySamples:
         distance: float,
         node: int,
         left: FloatArray,
+        wider: int,
     ) -> None:
         q, spec = self._Q[node : node + 1], self._spec
         near = [
-            self._near_goals.of(q, spec.neighbours)[1][0],
-            self._near_samples.of(q, spec.sample_neighbours)[1][0] + self._goals,
+            self._near_goals.of(q, wider * spec.neighbours)[1][0],
+            self._near_samples.of(q, wider * spec.sample_neighbours)[1][0]
+            + self._goals,
         ]
         rows = np.concatenate(near)
         # However long: a few hundred samples lie far apart in six dimensions.

@@ -25,6 +25,7 @@ from reachmap.core.planning.motion import MotionChecker
 from reachmap.core.planning.planner import Planner
 from reachmap.core.planning.shortcut import cut_corners, skip_waypoints
 from reachmap.core.planning.timing import path_length_rad
+from reachmap.geometry import pieces
 
 # Pieces as long as the arm sees of its way between two of them: longer ones miss
 # places to branch off, shorter ones are not worth their checks.
@@ -100,7 +101,7 @@ class RouteNetwork:
         along: list[list[int]] = [[]]
         for route in routes:
             last = 0
-            for q in pieces(route)[1:]:
+            for q in pieces(route, _PIECE_RAD)[1:]:
                 along[last].append(len(nodes))
                 along.append([last])
                 last = len(nodes)
@@ -154,7 +155,10 @@ class RouteNetwork:
             origin = int(node[row, column])
             if self._first_on_way(origin) in used:
                 continue
-            if motions.is_verified(self.Q[origin], goals[row]):
+            # At the planning step first, as planners search: its checks grow evenly
+            # with the length, and foretell those of a neighbouring grasp.
+            ends = self.Q[origin], goals[row]
+            if motions.is_free(*ends) and motions.is_verified(*ends):
                 ways.append(np.vstack([self.route_to(origin), goals[row]]))
                 used.add(self._first_on_way(origin))
                 if origin == 0 or len(ways) == spec.ways:
@@ -191,16 +195,6 @@ def _shortest_ways(
                 if length_rad[other] == np.inf and (known or step <= _LONGEST_JOIN_RAD):
                     heapq.heappush(pending, (length + step, other, node, known))
     return length_rad, before
-
-
-def pieces(path: FloatArray, step_rad: float = _PIECE_RAD) -> FloatArray:
-    """Way-points of a path and points between them, no further apart than a step."""
-    parts = [path[:1]]
-    for q_from, q_to in zip(path[:-1], path[1:], strict=True):
-        count = max(1, int(np.ceil(np.linalg.norm(q_to - q_from) / step_rad)))
-        shares = np.arange(1, count + 1)[:, None] / count
-        parts.append(q_from + shares * (q_to - q_from))
-    return np.vstack(parts)
 
 
 def spread_over(Q: FloatArray, count: int) -> IntArray:

@@ -163,14 +163,14 @@ def _fastest_profile(
     limit: list[float], bends: list[list[float]], reach: list[list[float]], step: float
 ) -> FloatArray:
     """Squared speeds from rest to rest, as fast as the limits allow; shape (n,)."""
-    # Plain numbers: NumPy takes longer for six of them.
+    # Plain numbers in lists: NumPy and generators take longer for six of them.
     last = len(limit) - 1
     x = [0.0] * (last + 1)
     for k in range(last, 0, -1):
-        slowest = max(-r - b * x[k] for r, b in zip(reach[k], bends[k], strict=True))
+        slowest = max([-r - b * x[k] for r, b in zip(reach[k], bends[k], strict=True)])
         x[k - 1] = min(limit[k - 1], max(x[k] - 2.0 * step * slowest, 0.0))
     x[0] = 0.0
     for k in range(last):
-        quickest = min(r - b * x[k] for r, b in zip(reach[k], bends[k], strict=True))
+        quickest = min([r - b * x[k] for r, b in zip(reach[k], bends[k], strict=True)])
         x[k + 1] = min(x[k + 1], max(x[k] + 2.0 * step * quickest, 0.0))
     return np.array(x)
