@@ -20,12 +20,14 @@ from reachmap.cli.options import (
 @click.command()
 @click.argument("before", metavar="BEFORE", type=INPUT_FILE)
 @click.argument("after", metavar="AFTER", type=INPUT_FILE)
+@click.argument("others", metavar="[MORE]...", nargs=-1, type=INPUT_FILE)
 @click.option(
     "--frame",
-    type=click.Choice(["robot_base", "bin"]),
+    type=click.Choice(["robot_base", "bin", "world"]),
     default="robot_base",
     show_default=True,
-    help="Where poses must agree; bin compares bins that stand in different places.",
+    help="Where poses must agree; bin compares bins that stand in different places, "
+    "world cells whose robots do.",
 )
 @click.option(
     "--tolerance",
@@ -54,7 +56,8 @@ from reachmap.cli.options import (
 def command(
     before: Path,
     after: Path,
-    frame: Literal["robot_base", "bin"],
+    others: tuple[Path, ...],
+    frame: Literal["robot_base", "bin", "world"],
     tolerance: tuple[float, float],
     fail_under: float | None,
     picture: Path | None,
@@ -67,24 +70,30 @@ def command(
     after its camera housing became slimmer. Test frames are matched by pose, never by
     index. Says how reachability changed and whether that is more than chance, which
     frames were gained and lost, why, on which squares, and what differs between the
-    two cells.
+    two cells. With MORE maps, each is compared with BEFORE, and all are drawn.
 
     Example: reachmap compare bin.h5 slim/bin.h5 --fail-under -0.5
     """
     if picture is None:
         unused("overwrite", because="needs --picture")
-    from reachmap.cli.text.compare import compare_text
-    from reachmap.tools.compare import compare, draw
+    from reachmap.cli.text.compare import compare_many_text, compare_text
+    from reachmap.tools.compare import compare_many, draw, draw_many
 
-    found = compare(
+    found = compare_many(
         before,
-        after,
+        [after, *others],
         frame=frame,
         tolerance_m=tolerance[0] / 1000.0,
         tolerance_deg=tolerance[1],
     )
-    if picture is not None:
-        draw(found, picture, overwrite=overwrite)
-    click.echo(json.dumps(found.facts()) if as_json else compare_text(found))
+    one = found.each[0]
+    if picture is not None and others:
+        draw_many(found, picture, overwrite=overwrite)
+    elif picture is not None:
+        draw(one, picture, overwrite=overwrite)
+    if as_json:
+        click.echo(json.dumps(found.facts() if others else one.facts()))
+    else:
+        click.echo(compare_many_text(found) if others else compare_text(one))
     if fail_under is not None:
         found.require(fail_under)

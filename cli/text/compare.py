@@ -9,7 +9,7 @@ import numpy as np
 from reachmap.cli.text.tables import fact_lines, table_lines
 from reachmap.maps.comparison.comparison import Cause, Comparison, SquareChange
 from reachmap.text import plural
-from reachmap.tools.compare import MapComparison
+from reachmap.tools.compare import MapComparison, MapComparisons
 
 SQUARES_SHOWN = 10
 CAUSES_SHOWN = 8
@@ -30,6 +30,34 @@ def compare_text(comparison: MapComparison) -> str:
         *_square_lines(r.squares),
         *_cell_lines(r.cell_changes),
     ]
+    return "\n".join(lines)
+
+
+def compare_many_text(comparisons: MapComparisons) -> str:
+    """A row for each map, then what differs between the cells of each pair."""
+    head = ["against " + comparisons.each[0].names[0], "frames", "before %", "after %",
+            "points", "gained", "lost", ""]  # fmt: skip
+    rows = [head]
+    for item, named in zip(comparisons.each, comparisons.significant, strict=True):
+        r = item.result
+        share = [100.0 * n / r.common for n in (r.reached_before, r.reached_after)]
+        rows.append(
+            [
+                item.names[1],
+                str(r.common),
+                *(f"{value:.2f}" for value in share),
+                f"{r.change:+.2f}",
+                str(r.gained),
+                str(r.lost),
+                "" if named else "not beyond chance",
+            ]
+        )
+    lines = [
+        *table_lines(rows, "<>>>>>><"),
+        "McNemar, false-discovery rate 5 % over all; two maps give causes and squares",
+    ]
+    for item in comparisons.each:
+        lines += ["", item.names[1], *_cell_lines(item.result.cell_changes)[1:]]
     return "\n".join(lines)
 
 

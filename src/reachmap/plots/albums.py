@@ -45,6 +45,7 @@ from reachmap.plots.parts.stack import LevelStack, level_title, stack_of
 from reachmap.plots.parts.style import PercentMap
 from reachmap.plots.placement import draw_placement, placement_words
 from reachmap.plots.study import draw_grid, draw_main_effects
+from reachmap.plots.study_space import draw_interactions, draw_parallel, draw_pareto
 
 # How close a height must be to a level to mean it [m].
 LEVEL_TOLERANCE = 1e-3
@@ -267,16 +268,33 @@ def _candidate_table(placement: BinPlacement) -> str:
 def study_album(
     study: Study, *, percent_map: PercentMap = "RdYlGn"
 ) -> list[Picture | Table]:
-    """List the pictures of a study: main effects, and the grid of two parameters."""
+    """List the pictures of a study.
+
+    Main effects, the grid of two parameters or interactions of more, all variants
+    across their parameters, and what is traded off against the first objective.
+    """
     items: list[Picture | Table] = []
-    is_table = study.design == "grid" and len(study.parameter_names) == 2
+    is_grid, count = study.design == "grid", len(study.parameter_names)
+    known = study.done & ~np.isnan(study.objective[:, 0])
     for k, name in enumerate(study.objective_names):
+        effects = partial(draw_main_effects, study, k)
         title = f"Main effects on {name}"
-        items.append(_picture(f"effects_{name}", title, draw_main_effects, study, k))
-        if is_table:
-            items.append(
-                _picture(f"grid_{name}", name, draw_grid, study, k, percent_map)
-            )
+        items.append(Picture(name=f"effects_{name}", title=title, draw=effects))
+        if is_grid and count == 2:
+            draw = partial(draw_grid, study, k, percent_map)
+            items.append(Picture(name=f"grid_{name}", title=name, draw=draw))
+        elif is_grid and count > 2 and known.any():
+            draw = partial(draw_interactions, study, k, percent_map)
+            items.append(Picture(name=f"interactions_{name}", title=name, draw=draw))
+    first = study.objective_names[0]
+    if count > 1 and known.any():
+        draw = partial(draw_parallel, study, 0, percent_map)
+        title = f"All variants, {first}"
+        items.append(Picture(name="variants", title=title, draw=draw))
+    for k, name in enumerate(study.objective_names[1:], 1):
+        title = f"{first} against {name}"
+        draw = partial(draw_pareto, study, 0, k)
+        items.append(Picture(name=f"pareto_{name}", title=title, draw=draw))
     return items
 
 

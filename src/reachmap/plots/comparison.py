@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -309,3 +310,75 @@ def _draw_means(axes: Axes, maps: MapChange) -> None:
     axes.legend(fontsize=7, loc="best", handlelength=1.8)
     for spine in axes.spines.values():
         spine.set_edgecolor(RULE)
+
+
+MULTIPLES_PER_ROW, MULTIPLE_IN, MULTIPLE_GAP = 4, 2.4, 0.55
+
+
+@drawing()
+def draw_small_multiples(
+    changes: Sequence[MapChange],
+    significant: Sequence[bool],
+    percent_map: PercentMap = "RdYlGn",
+) -> Figure:
+    """Draw one map and several others at one level, in one scale of colours.
+
+    Parameters
+    ----------
+    changes : sequence of MapChange
+        Of the first map to each of the others.
+    significant : sequence of bool
+        Which changes are more than chance.
+    percent_map : str
+    """
+    most = max(changes, key=lambda c: float(np.nanmax(np.abs(c.change), initial=0.0)))
+    z = float(most.z[most.most_changed()])
+    first = changes[0]
+    panels = [(first, first.before, first.names[0], "")]
+    for change, named in zip(changes, significant, strict=True):
+        said = _mean_text(change.change[_level_at(change, z)], signed=True)
+        said += "" if named else ", chance"
+        panels.append((change, change.after, change.names[1], said))
+    columns = min(len(panels), MULTIPLES_PER_ROW)
+    rows = -(-len(panels) // columns)
+    heights = [_height_in(change) for change, *_ in panels]
+    height = max(heights) + 0.75
+    width = LEFT + columns * (MULTIPLE_IN + MULTIPLE_GAP) + RIGHT
+    figure = new_figure(width, BOTTOM + rows * height + TOP - 0.3)
+    for k, (change, values, name, said) in enumerate(panels):
+        row, column = divmod(k, columns)
+        left = LEFT + column * (MULTIPLE_IN + MULTIPLE_GAP)
+        bottom = BOTTOM + (rows - 1 - row) * height
+        axes = axes_at(figure, left, bottom, MULTIPLE_IN, heights[k])
+        level = _level_at(change, z)
+        span = float(np.ptp(cell_edges(change.x)))
+        mesh = draw_squares(
+            axes,
+            change.x,
+            change.y,
+            values[level],
+            colours=colour_map(percent_map),
+            scale=PERCENT_SCALE,
+            font_size=number_size(change.x, change.y, MULTIPLE_IN / span),
+            scale_in=MULTIPLE_IN / span,
+        )
+        mean = _mean_text(values[level])
+        axes.set_title(f"{name}\n{mean}{said and ' · ' + said}", loc="left", fontsize=8)
+        if row == rows - 1:
+            axes.set_xlabel(f"x in {change.frame} [m]")
+    left = LEFT + columns * (MULTIPLE_IN + MULTIPLE_GAP) - 0.3
+    box = (left, BOTTOM, 0.14, heights[0])
+    colour_bar(figure, mesh, box, "path reachability [%]")
+    where = f"z = {level_names(np.array([z]))[0].replace('-', MINUS)} m"
+    said = f"{where} · over the test frames shared with {first.names[0]}"
+    put_title(figure, LEFT, f"{len(panels)} maps compared", said)
+    return figure
+
+
+def _level_at(change: MapChange, z: float) -> int:
+    return int(np.abs(change.z - z).argmin())
+
+
+def _height_in(change: MapChange) -> float:
+    x, y = (float(np.ptp(cell_edges(axis))) for axis in (change.x, change.y))
+    return float(np.clip(MULTIPLE_IN * y / x, 0.6, 2.0 * MULTIPLE_IN))

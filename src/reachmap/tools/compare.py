@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from reachmap.errors import GateFailedError, SettingsError
 from reachmap.maps.bytes.to_json import json_ready
 from reachmap.maps.comparison.comparison import Comparison, SquareChange, compare_maps
 from reachmap.maps.comparison.pose_matching import TOLERANCE_DEG, TOLERANCE_M, Frame
+from reachmap.maps.comparison.significance import benjamini_hochberg
 from reachmap.maps.format.registry import kind_of
 from reachmap.maps.records import BinMap, WorkspaceMap
 from reachmap.tools.artefacts import read_artefact_or_journal
@@ -93,8 +98,9 @@ def compare(
     ----------
     before, after : Path
         Workspace maps or bin maps, or journals of unfinished runs.
-    frame : {"robot_base", "bin"}
-        Where poses must agree; "bin" compares bins that stand in different places.
+    frame : {"robot_base", "bin", "world"}
+        Where poses must agree; "bin" compares bins that stand in different places,
+        "world" cells whose robots do.
     tolerance_m, tolerance_deg : float
         Poses closer than this are the same [m, deg].
 
@@ -116,6 +122,92 @@ def compare(
         a, b, frame=frame, tolerance_m=tolerance_m, tolerance_deg=tolerance_deg
     )
     return MapComparison(paths=(before, after), before=a, after=b, result=result)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MapComparisons:
+    """One map against each of several others.
+
+    Attributes
+    ----------
+    each : tuple of MapComparison
+        The first map is the same in all.
+    significant : tuple of bool
+        Which changes are more than chance, at a false-discovery rate of 5 % over all.
+    """
+
+    each: tuple[MapComparison, ...]
+    significant: tuple[bool, ...]
+
+    def facts(self) -> dict[str, Any]:
+        """Everything as JSON values."""
+        return {
+            "before": str(self.each[0].paths[0]),
+            "comparisons": [
+                item.facts() | {"significant": named}
+                for item, named in zip(self.each, self.significant, strict=True)
+            ],
+        }
+
+    def require(self, points: float) -> None:
+        """Raise GateFailedError if a change is below a number of points."""
+        for item in self.each:
+            item.require(points)
+
+
+def compare_many(
+    before: Path,
+    others: Sequence[Path],
+    *,
+    frame: Frame = "robot_base",
+    tolerance_m: float = TOLERANCE_M,
+    tolerance_deg: float = TOLERANCE_DEG,
+) -> MapComparisons:
+    """Compare one map with each of several; see :func:`compare`."""
+    each = tuple(
+        compare(
+            before,
+            after,
+            frame=frame,
+            tolerance_m=tolerance_m,
+            tolerance_deg=tolerance_deg,
+        )
+        for after in others
+    )
+    p_values = np.array([item.result.p_value for item in each])
+    named = tuple(benjamini_hochberg(p_values).tolist())
+    return MapComparisons(each=each, significant=named)
+
+
+def draw_many(
+    comparisons: MapComparisons, output: Path, *, overwrite: bool = False
+) -> tuple[Path, ...]:
+    """Draw all maps side by side, at the level that changed most.
+
+    Parameters
+    ----------
+    comparisons : MapComparisons
+    output : Path
+        A file name in .png or .svg, or a folder.
+    """
+    from reachmap.plots.comparison import draw_small_multiples
+    from reachmap.plots.parts.files import Picture, write_all
+
+    changes = [map_change(item) for item in comparisons.each]
+    is_file = output.suffix in SUFFIXES
+    picture = Picture(
+        name=output.stem if is_file else "comparison",
+        title="Maps compared",
+        draw=partial(draw_small_multiples, changes, comparisons.significant),
+    )
+    return write_all(
+        output.parent if is_file else output,
+        [picture],
+        kind="svg" if output.suffix == ".svg" else "png",
+        config_sha256=comparisons.each[-1].after.stamp.config_sha256,
+        overwrite=overwrite,
+        inputs=[path for item in comparisons.each for path in item.paths],
+    )
 
 
 def _read_map(path: Path) -> WorkspaceMap | BinMap:
@@ -179,8 +271,12 @@ def map_change(comparison: MapComparison) -> MapChange:
         names=comparison.names,
         headline=comparison.headline[:1].upper() + comparison.headline[1:],
         details=_details(comparison.result),
-        frame="bin" if in_bin else "robot_base",
-        outlines=() if in_bin else context_of(after.provenance).standing,
+        frame="bin" if in_bin else comparison.result.frame,
+        outlines=(
+            ()
+            if in_bin or comparison.result.frame == "world"
+            else context_of(after.provenance).standing
+        ),
     )
 
 

@@ -249,3 +249,34 @@ def test_what_differs_between_the_cells_is_named() -> None:
     )
     odd = dataclasses.replace(record.provenance, cell_resolved_json="{")
     assert cell_changes(a, odd) == ()
+
+
+def test_in_the_world_frames_are_those_that_stand_where_they_stood():
+    """A robot a step further, and cubes a step back: the same frames, none changed."""
+    before = dataclasses.replace(random_workspace(3), T_world_base=np.eye(4))
+    step = float(before.x[1] - before.x[0])
+    cubes = {
+        name: dataclasses.replace(cube, x=cube.x - step)
+        for name, cube in before.cubes.items()
+    }
+    after = dataclasses.replace(
+        rebuilt(before, cubes), T_world_base=yaw_transform(step, 0.0, 0.0, 0.0)
+    )
+    found = compare_maps(before, after, frame="world")
+    assert found.common == found.frames_before == found.frames_after
+    assert (found.gained, found.lost) == (0, 0)
+    assert found.frame == "world"
+    seen_from_base = compare_maps(before, after)
+    assert seen_from_base.common < found.common
+    assert seen_from_base.gained + seen_from_base.lost > 0
+
+
+def test_in_the_world_a_turned_robot_has_turned_frames():
+    """Poses turn with the base: positions and orientations, not squares of a bin."""
+    T = yaw_transform(0.4, -0.2, 0.1, 0.7)
+    record = dataclasses.replace(random_workspace(4), T_world_base=T)
+    own, world = frame_table(record), frame_table(record, "world")
+    assert np.allclose(world.position, own.position @ T[:3, :3].T + T[:3, 3])
+    assert np.allclose(world.rotation, T[:3, :3] @ own.rotation)
+    bins = dataclasses.replace(synthetic_bin_map(), T_world_base=T)
+    assert np.allclose(frame_table(bins, "world").square, frame_table(bins).square)

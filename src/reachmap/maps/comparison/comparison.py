@@ -100,7 +100,7 @@ class Comparison:
     ----------
     kind : str
     frame : str
-        Where poses were matched: "robot_base" or "bin".
+        Where poses were matched: "robot_base", "bin" or "world".
     tolerance_m, tolerance_deg : float
     frames_before, frames_after : int
         Different poses that each map attempted.
@@ -160,8 +160,9 @@ def compare_maps(
     ----------
     before, after : WorkspaceMap or BinMap
         Of the same kind.
-    frame : {"robot_base", "bin"}
-        Where poses must agree; "bin" compares bins that stand in different places.
+    frame : {"robot_base", "bin", "world"}
+        Where poses must agree; "bin" compares bins that stand in different places,
+        "world" cells whose robots do.
     tolerance_m, tolerance_deg : float
         Poses closer than this are the same [m, deg].
 

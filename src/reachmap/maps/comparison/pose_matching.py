@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
@@ -10,10 +12,12 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from reachmap._typing import CodeArray, FloatArray, IntArray
+from reachmap.cell.model.fields import PoseSpec
+from reachmap.errors import SettingsError
 from reachmap.geometry import inverse_transform, rotation_from_quaternion_wxyz
 from reachmap.maps.records import BinMap, Status, WorkspaceMap, freeze
 
-Frame: TypeAlias = Literal["robot_base", "bin"]
+Frame: TypeAlias = Literal["robot_base", "bin", "world"]
 
 TOLERANCE_M = 1e-4
 TOLERANCE_DEG = 0.1
@@ -72,7 +76,7 @@ def frame_table(
     Parameters
     ----------
     record : WorkspaceMap or BinMap
-    frame : {"robot_base", "bin"}
+    frame : {"robot_base", "bin", "world"}
         Where poses are given; "bin" is for bin maps only.
     tolerance_m, tolerance_deg : float
         Poses closer than this are the same [m, deg].
@@ -82,6 +86,8 @@ def frame_table(
         if isinstance(record, BinMap)
         else _cube_parts(record)
     )
+    if frame == "world":
+        parts = [_in_world(part, record) for part in parts]
     table = FrameTable(
         **{
             name: np.concatenate([getattr(part, name) for part in parts])
@@ -168,6 +174,38 @@ def _cube_parts(record: WorkspaceMap) -> Sequence[FrameTable]:
             )
         )
     return parts
+
+
+def _in_world(part: FrameTable, record: WorkspaceMap | BinMap) -> FrameTable:
+    """The same frames in the world; squares of a workspace are, too."""
+    T = T_world_base_of(record)
+    position = part.position @ T[:3, :3].T + T[:3, 3]
+    return dataclasses.replace(
+        part,
+        position=position,
+        rotation=T[:3, :3] @ part.rotation,
+        square=part.square if isinstance(record, BinMap) else position,
+    )
+
+
+def T_world_base_of(record: WorkspaceMap | BinMap) -> FloatArray:  # noqa: N802
+    """robot_base of a map's cell in the world, shape (4, 4).
+
+    Raises
+    ------
+    SettingsError
+        The map does not tell.
+    """
+    if record.T_world_base is not None:
+        return record.T_world_base
+    try:
+        cell = json.loads(record.provenance.cell_resolved_json)
+        return PoseSpec.model_validate(cell["robot"]["base_pose"]).matrix()
+    except (ValueError, KeyError, TypeError, RecursionError):
+        raise SettingsError(
+            "a map does not say where its robot is in the world; compare it in "
+            "robot_base or bin"
+        ) from None
 
 
 def _bin_part(record: BinMap, frame: Frame) -> FrameTable:
