@@ -103,7 +103,9 @@ def draw_pareto(study: Study, first: int, second: int) -> Figure:
     axes.grid(color="#e4e4e4", linewidth=0.7)
     axes.set_axisbelow(True)
     axes.legend(frameon=False, fontsize=7.5)
-    said = f"{int(front.sum())} of {int(known.sum())} variants are bettered by none"
+    said = (
+        f"{int(front.sum())} of {int(known.sum())} variants are dominated by no other"
+    )
     put_title(figure, LEFT, f"{names[0]} against {names[1]}", said)
     return figure
 
@@ -218,7 +220,7 @@ def draw_interactions(
                 axes.text(
                     x + 0.5, y + 0.5, f"{mean:.0f}" if unit == "%" else f"{mean:.2f}",
                     ha="center", va="center", fontsize=6.5,
-                    color=ink_on(np.array(mesh.to_rgba(mean))),
+                    color=ink_on(np.array(mesh.to_rgba(np.array(mean)))),
                 )  # fmt: skip
         for axis, k in ((axes.xaxis, a), (axes.yaxis, b)):
             values = np.unique(study.parameter[known, k])
@@ -237,7 +239,7 @@ def draw_interactions(
 def _pair_table(
     study: Study, value: FloatArray, known: BoolArray, a: int, b: int
 ) -> FloatArray:
-    """Means over the rest, shape (values of b, values of a); NaN where there is none."""
+    """Means over the rest, shape (values of b, values of a); NaN: none."""
     columns = [study.parameter[:, k] for k in (a, b)]
     xs, ys = (np.unique(column[known]) for column in columns)
     table = np.full((len(ys), len(xs)), np.nan)
