@@ -1,7 +1,10 @@
 """Test frames of the bin and of the workspace."""
 
+from pathlib import Path
+
 import numpy as np
 
+from reachmap.cell.loading import read_cell
 from reachmap.cell.model.cell import (
     BinScanSpec,
     BinSpec,
@@ -11,9 +14,10 @@ from reachmap.cell.model.cell import (
     TcpSpec,
     WorkspaceScanSpec,
 )
-from reachmap.geometry import yaw_transform
+from reachmap.geometry import rotation_angle, yaw_transform
 from reachmap.sampling.frames import bin_test_frames, cell_centres, workspace_frames
 
+HARD_CELLS = Path(__file__).parents[2] / "benchmarks" / "hard_cells"
 ARM = RobotSpec(urdf="arm.urdf", tcp=TcpSpec(parent="tool"))
 
 
@@ -78,3 +82,18 @@ def test_chosen_frames_equal_the_full_product() -> None:
     np.testing.assert_array_equal(frames.transforms_at(slice(20, 40)), whole[20:40])
     some = np.array([150, 3, 3, 77])
     np.testing.assert_array_equal(frames.transforms_at(some), whole[some])
+
+
+def test_a_plain_cone_under_a_ceiling_is_the_list_written_for_it() -> None:
+    """Of an arm that hangs, down is +z: what had to be listed before, row by row."""
+    name = str(HARD_CELLS / "ceiling-ur10.yaml")
+    cone = "{family: cone, tilts_deg: [0, 30], azimuths: [1, 6], rolls: 3}"
+    listed, plain = (
+        workspace_frames(read_cell(name, overrides).cell)[0].frames
+        for overrides in ([], [f"workspace_scan.orientations={cone}"])
+    )
+    np.testing.assert_array_equal(listed.points, plain.points)
+    apart = rotation_angle(listed.orientations[:, None], plain.orientations)
+    # The list is rounded to thousandths of a degree.
+    assert np.degrees(apart.min(axis=0)).max() < 2e-3
+    assert sorted(apart.argmin(axis=0)) == list(range(21))
