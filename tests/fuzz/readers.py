@@ -5,8 +5,10 @@
     python -m tests.fuzz.readers grasps                   # until a finding, or Ctrl-C
     python -m tests.fuzz.readers cell -runs=10000 -seed=1
 
-Whatever the input, a reader returns or raises a ReachmapError; anything else is a
-finding, which the fuzzer (atheris, the extra [fuzz]) writes to a file. Options in one
+Whatever the input, a reader returns or raises a ReachmapError, and what it returns is
+no other answer in silence: a cell is the same when it is written and read again, a map
+has the numbers of the one that was damaged, a text means the same twice. Anything else
+is a finding, which the fuzzer (atheris, the extra [fuzz]) writes to a file. Options in one
 dash are libFuzzer's. A finding becomes a test of the reader's own.
 """
 
@@ -20,6 +22,7 @@ import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -61,13 +64,20 @@ grasps:
 def cell(data: bytes, folder: Path) -> None:
     """Text of a cell file, with everything that it refers to."""
     from reachmap.cell.loading import cell_from_json, read_cell
+    from reachmap.cell.text.yaml_writer import cell_yaml
 
     path = folder / "cell.yaml"
     path.write_bytes(data)
     loaded = read_cell(str(path))
-    cell_from_json(
-        loaded.resolved_json, urdf=loaded.urdf, files_sha256=loaded.files_sha256
+    stored = cell_from_json(
+        loaded.resolved_json,
+        urdf=loaded.urdf,
+        srdf=loaded.srdf,
+        files_sha256=loaded.files_sha256,
     )
+    assert stored.sha256 == loaded.sha256
+    path.write_text(cell_yaml(loaded.cell), encoding="utf-8")
+    assert read_cell(str(path)).resolved_json == loaded.resolved_json
 
 
 def urdf(data: bytes, folder: Path) -> None:
@@ -77,7 +87,8 @@ def urdf(data: bytes, folder: Path) -> None:
 
     path = folder / "arm.urdf"
     path.write_bytes(data)
-    parse_urdf(read_text(path, limit=10**6), "arm.urdf")
+    text = read_text(path, limit=10**6)
+    assert parse_urdf(text, "arm.urdf") == parse_urdf(text, "arm.urdf")
 
 
 def srdf(data: bytes, folder: Path) -> None:
@@ -85,8 +96,9 @@ def srdf(data: bytes, folder: Path) -> None:
     from reachmap.cell.files.srdf import parse_srdf
     from reachmap.cell.files.urdf import parse_urdf
 
-    text = data.decode("utf-8", "replace")
-    parse_srdf(text, "arm.srdf", parse_urdf(URDF, "arm.urdf"))
+    text, robot = data.decode("utf-8", "replace"), parse_urdf(URDF, "arm.urdf")
+    found, again = (parse_srdf(text, "arm.srdf", robot) for _ in range(2))
+    assert found == again
 
 
 def limits(data: bytes, folder: Path) -> None:
@@ -95,7 +107,8 @@ def limits(data: bytes, folder: Path) -> None:
     from reachmap.cell.files.urdf import parse_urdf
 
     text, robot = data.decode("utf-8", "replace"), parse_urdf(URDF, "arm.urdf")
-    parse_joint_limits(text, "joint_limits.yaml", robot)
+    found, again = (parse_joint_limits(text, "limits.yaml", robot) for _ in range(2))
+    assert found == again
 
 
 def grasps(data: bytes, folder: Path) -> None:
@@ -107,9 +120,12 @@ def grasps(data: bytes, folder: Path) -> None:
     path.write_bytes(data)
     for how in ({}, {"frame": "bin"}):
         try:
-            read_grasps(path, **how)
+            found, again = (read_grasps(path, **how) for _ in range(2))
         except (GraspListError, SettingsError):
             continue
+        for name in ("points", "directions"):
+            numbers = getattr(found, name)
+            np.testing.assert_array_equal(numbers, getattr(again, name))
 
 
 def hdf5(data: bytes, folder: Path) -> None:
@@ -122,9 +138,10 @@ def hdf5(data: bytes, folder: Path) -> None:
     for content in (data, image + seal(image)):
         path.write_bytes(content)
         try:
-            read_artefact(path)
+            found = read_artefact(path)
         except ReachmapError:
             continue
+        assert found.stamp.content_sha256 == _content_sha256()
 
 
 TARGETS: dict[str, Callable[[bytes, Path], None]] = {
@@ -165,6 +182,16 @@ def _placement() -> bytes:
         path = Path(folder) / "placement.h5"
         write_placement(path, synthetic_placement())
         return path.read_bytes()
+
+
+@cache
+def _content_sha256() -> str:
+    from reachmap.maps.format.registry import read_artefact
+
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "placement.h5"
+        path.write_bytes(_placement())
+        return str(read_artefact(path).stamp.content_sha256)
 
 
 def attempt(name: str, data: bytes, folder: Path) -> None:
