@@ -8,8 +8,8 @@
 Whatever the input, a reader returns or raises a ReachmapError, and what it returns is
 no other answer in silence: a cell is the same when it is written and read again, a map
 has the numbers of the one that was damaged, a text means the same twice. Anything else
-is a finding, which the fuzzer (atheris, the extra [fuzz]) writes to a file. Options in one
-dash are libFuzzer's. A finding becomes a test of the reader's own.
+is a finding, which the fuzzer (atheris, the extra [fuzz]) writes to a file. Options in
+one dash are libFuzzer's. A finding becomes a test of the reader's own.
 """
 
 from __future__ import annotations
