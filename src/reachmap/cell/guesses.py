@@ -193,7 +193,8 @@ class _Tree:
         found = []
         for joint in robot.joints.values():
             leader = joint.mimics
-            if leader is not None and leader in beyond:
+            # A rod of a parallelogram may lead another one; fingers lead by themselves.
+            if leader in beyond and robot.joints[leader].moves:
                 outer = beyond[leader]
                 if joint.name not in outer and not any(
                     robot.joints[name].moves for name in outer
