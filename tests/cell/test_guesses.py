@@ -71,12 +71,12 @@ def test_fingers_are_no_axes(joints: tuple[str, ...], tip: str) -> None:
         # a torso that branches into arms
         (("l6>a revolute", "a>b revolute", "b>c revolute", "c>d revolute",
           "d>e revolute", "l6>head revolute"), "e"),
-        # a rod that follows the arm and leads a link beyond it, as in Dobot's MG400
+        # a rod leads the last link, as in Dobot's MG400
         (
-            ("l6>e revolute", "l5>p revolute j_l6", "p>s revolute j_p",
-             "e>f revolute j_s", "f>g revolute"),
+            ("l1>p revolute j_l2", "p>s revolute j_p", "l6>f revolute j_s",
+             "f>g revolute"),
             "g",
-        ),  # fmt: skip
+        ),
     ],
 )  # fmt: skip
 def test_axes_are_no_fingers(joints: tuple[str, ...], tip: str) -> None:
