@@ -120,7 +120,7 @@ list_options = compose(
         type=click.IntRange(1, 64),
         default=1,
         show_default=True,
-        help="Blend the costs of so many test points; 1 takes the nearest.",
+        help="Blend the costs of the N nearest test points.",
     ),
     click.option(
         "--roll",

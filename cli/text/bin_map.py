@@ -105,7 +105,7 @@ def _emptying_lines(emptying: Emptying | None) -> list[str]:
                 *(percent_text(value) for value in values),
             ]
         )
-    below = "" if emptying.filled else " (parts below a layer are no obstacle)"
+    below = "" if emptying.filled else " (parts below a layer are not obstacles)"
     return [
         "",
         f"Emptying: {emptying.sentence}{below}",

@@ -62,7 +62,7 @@ def _limit(facts: dict[str, Any]) -> Iterator[str]:
     body = facts["tool_limit_body"] or "the tool"
     yield (
         f"no pose can score more than {facts['tool_limit_percent']:.1f}%: the tool "
-        f"itself meets the bin ({body} most)"
+        f"itself collides with the bin ({body} most)"
     )
     gains = [
         f"{name} +{points:.1f} points"

@@ -97,7 +97,7 @@ def test_info_of_a_placement(folder: Path) -> None:
     assert "runner-up" in text
     assert "paper's choice" in text
     assert "+x 0.12 m, -x 0.08 m, +yaw 22.9 deg" in text
-    assert "1  the bin meets pedestal" in text
+    assert "1  the bin collides with pedestal" in text
 
 
 @pytest.mark.parametrize("name", ["workspace.h5", "bin.h5", "placement.h5"])

@@ -60,7 +60,7 @@ def test_the_bin_may_stand_on_something():
     lower = FIT.contact(yaw_transform(0.0, 0.4, top + 0.005, 0.0))
     assert lower is not None
     assert lower.pair == "bin bottom touches pedestal"
-    assert lower.reason == "the bin meets pedestal"
+    assert lower.reason == "the bin collides with pedestal"
 
 
 def test_a_body_inside_the_bin_is_in_the_way():

@@ -123,7 +123,7 @@ def test_fixed_values_stay_fixed():
 def test_a_region_in_the_pedestal_is_a_clear_error():
     """Where the bin can stand nowhere, the message says what it meets."""
     low, high = (0.0, -0.1, -0.3, 0.0), (0.2, 0.1, -0.1, np.pi)
-    with pytest.raises(SceneError, match=r"nowhere.*the bin meets pedestal"):
+    with pytest.raises(SceneError, match=r"nowhere.*the bin collides with pedestal"):
         decide_by_search(question(hill(0, 0, 0, 0), low=low, high=high), 5)
 
 

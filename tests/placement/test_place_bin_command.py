@@ -248,7 +248,7 @@ def test_a_region_without_a_feasible_pose_is_refused(ur5, tmp_path):
     )  # fmt: skip
     assert result.exit_code == 2
     assert "the bin can stand nowhere in the region" in result.stderr
-    assert "the bin meets pedestal" in result.stderr
+    assert "the bin collides with pedestal" in result.stderr
 
 
 def test_a_region_off_the_map_is_refused(toy, tmp_path):

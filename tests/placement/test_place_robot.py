@@ -226,7 +226,7 @@ def test_arms_are_compared_in_one_call(tmp_path):
     [
         (RobotChoice(mountings=("roof",)), "--mount 'roof'.*floor, wall, ceiling"),
         (RobotChoice(rail="joint_1"), "--rail 'joint_1'.*prismatic"),
-        (RobotChoice(moves=("table",)), "'table' is no body on the world"),
+        (RobotChoice(moves=("table",)), "'table' is not a body on the world"),
         (RobotChoice(fixed={"roll": 1.0}), "--fix roll"),
         (RobotChoice(rail="x", mountings=("floor",)), "--rail: the base stays"),
     ],

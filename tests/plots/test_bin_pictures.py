@@ -265,7 +265,7 @@ def test_placement_shows_bins_where_they_would_stand() -> None:
     assert {"runner-up", "the paper's rule", "robot base (origin)"} <= labels
     words = " ".join(text.get_text() for text in figure.texts)
     assert "+x 120 mm, −x 80 mm, +yaw 23°, −yaw 20°" in words
-    assert "1 the bin meets pedestal" in words
+    assert "1 the bin collides with pedestal" in words
 
 
 def test_directions_are_drawn_beside_frames_and_points() -> None:

@@ -179,7 +179,7 @@ def test_placement_is_drawn_on_the_map_it_was_made_from(folder: Path) -> None:
     ]
     rows = (folder / "heatmaps" / "placement.csv").read_text().splitlines()
     assert len(rows) == 5
-    assert rows[-1].endswith("the bin meets pedestal")
+    assert rows[-1].endswith("the bin collides with pedestal")
     write_placement(folder / "other.h5", synthetic_placement())
     result = run("other.h5", "-o", "other")
     assert names(result) == ["other/placement.png"]

@@ -322,7 +322,7 @@ def synthetic_placement(**changes: Any) -> BinPlacement:
         "worst_point": np.array([70.0, 55.0, 40.0, np.nan]),
         "reachable_share": np.array([96.0, 91.5, 88.0, np.nan]),
         "exact": np.array([1, 1, 1, 0], np.uint8),
-        "reason": ("", "", "", "the bin meets pedestal"),
+        "reason": ("", "", "", "the bin collides with pedestal"),
         "margin": {"+x": 0.12, "-x": 0.08, "+yaw": 0.4, "-yaw": 0.35},
         "joint_names": JOINTS,
         "stamp": synthetic_stamp(),

@@ -37,7 +37,7 @@ def fragment_overrides(path: Path, cell_text: str, label: str) -> tuple[str, ...
     Raises
     ------
     CellError
-        It is no such file; the values are checked with the cell.
+        It is not such a file; the values are checked with the cell.
     """
     data = parse_yaml(read_text(path, limit=MAX_TEXT_BYTES), str(path)).data
     if not isinstance(data, dict) or not data:

@@ -24,7 +24,7 @@ def check_part_choice(document: Document) -> None:
     if name not in known:
         hint = did_you_mean(name, known) or "parts has none"
         document.add(("part",), f"no part {name!r}; {hint}")
-        # What is missing for want of a part is no mistake of its own.
+        # What is missing because there is no part is not a mistake of its own.
         document.data["part"] = None
 
 

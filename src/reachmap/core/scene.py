@@ -254,7 +254,7 @@ class Scene:
         for index in self.checker.touching_pairs(q):
             first, second = self.checker.body_pairs[index].split(" | ")
             problems.append(f"scan_configuration: {first} touches {second}")
-        # Bodies that stand still are no collision pairs; here they are looked at.
+        # Bodies that stand still are not collision pairs; here they are checked.
         if self.with_bin:
             fit = BinFit(robot, self.loaded, None, empty=False)
             contact = fit.contact(self.T_base_bin)

@@ -104,7 +104,7 @@ def decide_as_given(question: Question, pose: Pose) -> Decision:
     Raises
     ------
     SceneError
-        The bin would meet something; both are named.
+        The bin would collide with something; both are named.
     """
     contact = question.fit.contact(question.T_base_bin(pose))
     if contact is not None:

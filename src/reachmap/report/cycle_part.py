@@ -43,7 +43,7 @@ def cycle_blocks(record: BinMap) -> Blocks:
             (end.grasps, end.stage, end.status, end.pair)
             for end in cycle.ends[:ENDS_SHOWN]
         ]
-        head = ("test grasps", "stage", "what became of it", "bodies in the way")
+        head = ("test grasps", "stage", "outcome", "bodies in the way")
         blocks.append(table(head, rows, "><<<"))
     return blocks
 

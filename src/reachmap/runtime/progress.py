@@ -144,7 +144,7 @@ class Progress:
             self._stream.write(text)
             self._stream.flush()
         except (OSError, ValueError):
-            self._quiet = True  # nobody reads it any more; the run goes on
+            self._quiet = True  # nobody reads it any more; the run continues
 
 
 def clock_text(seconds: float) -> str:

@@ -142,7 +142,7 @@ class Store(Entries):
 
 @contextmanager
 def open_store(path: Path, header: Header, *, restart: bool = False) -> Iterator[Store]:
-    """Create a store, or open it to go on with it.
+    """Create a store, or open it to resume it.
 
     Parameters
     ----------
@@ -247,7 +247,7 @@ def _check_same_work(path: Path, old: Header, new: Header) -> None:
         shown.append(f"and {len(changed) - len(shown)} more")
     raise MapFileError(
         f"{path} belongs to other settings ({', '.join(shown)}): give the same "
-        "settings to go on with it, another output to keep it, or --restart to "
+        "settings to resume it, another output to keep it, or --restart to "
         "discard it"
     )
 

@@ -252,7 +252,7 @@ def _mounting(
     for body in (*choice.moves, *choice.stays):
         if body not in known:
             raise SettingsError(
-                f"{body!r:.60} is no body on the world "
+                f"{body!r:.60} is not a body on the world "
                 f"(those are: {', '.join(sorted(known)) or 'none'})"
             )
     stands = dict.fromkeys([*stands_of(loaded), *choice.moves])

@@ -30,7 +30,7 @@ class ViewOptions:
     """How the live view is served.
 
     On an address other than those of this machine alone, a token is part of the
-    address that is told, and nobody is let in without it.
+    address that is printed, and nobody gets in without it.
     """
 
     host: str = HOST

@@ -63,7 +63,7 @@ class ReliabilityDiagram:
 def reliability_diagram(
     probability: FloatArray, reached: BoolArray
 ) -> ReliabilityDiagram:
-    """Compare probabilities (n,), NaN for none, with what became of the grasps (n,)."""
+    """Compare probabilities (n,), NaN for none, with outcomes of grasps (n,)."""
     known = ~np.isnan(probability)
     p, hit = probability[known], reached[known]
     number = np.minimum((p * BINS).astype(int), BINS - 1)

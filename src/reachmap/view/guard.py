@@ -32,7 +32,7 @@ class Guard:
     ----------
     host : str
         Address the view listens on. On a loopback address only pages under a name of
-        this machine are let in; on any other, those who know the token.
+        this machine may connect; on any other, those who know the token.
 
     Attributes
     ----------

@@ -124,7 +124,7 @@ def _write_out_carrier(document: Document, place: Location) -> None:
         document.add(
             location, f"no carrier {name!r}; {hint} (`reachmap carriers` lists them)"
         )
-        # What is missing for want of a carrier is no mistake of its own.
+        # What is missing because there is no carrier is not a mistake of its own.
         tray.setdefault("inner", [1.0, 1.0, 1.0])
         return
     tray["carrier"] = carrier.name

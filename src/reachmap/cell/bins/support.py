@@ -133,7 +133,7 @@ def _stood(
         known = ", ".join(face.name for face in every) or "none"
         document.add(
             where,
-            f"{name!r} is no body with a level top face that is attached to world or "
+            f"{name!r} is not a body with a level top face, attached to world or "
             f"robot_base (those are: {known})",
         )
         return None

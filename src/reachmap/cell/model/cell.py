@@ -150,7 +150,7 @@ class Cell(Record):
     )
     part: PartChoice | None = Field(
         None,
-        description="What is picked; with it the bin scan goes on after the grasp. A "
+        description="What is picked; with it the bin scan continues after the grasp. A "
         "name takes one of parts.",
     )
     parts: dict[Identifier, PartSpec] = Field(

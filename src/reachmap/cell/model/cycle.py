@@ -24,7 +24,7 @@ Depth = Annotated[Coordinate, Field(ge=0)]
 
 
 class PartSpec(Record):
-    """The part that hangs on the tool from the grasp until it is let go."""
+    """The part that hangs on the tool from the grasp until its release."""
 
     shape: Shape = Field(description="One primitive or mesh.")
     pose: PoseSpec = Field(PoseSpec(), description="Shape centre in the TCP frame.")
@@ -132,7 +132,7 @@ class DropOffSpec(JointValues):
         "still.",
     )
     pose: PoseSpec | None = Field(
-        None, description="TCP when the part is let go, in that frame."
+        None, description="TCP when the part is released, in that frame."
     )
     free_about: Symmetry = Field(
         1,
@@ -183,7 +183,7 @@ class CycleSpec(Record):
         0.0, description="From the arm's standstill until grasps are known [s]."
     )
     grasp_s: NonNegative = Field(0.0, description="Until the part is held [s].")
-    release_s: NonNegative = Field(0.0, description="Until it is let go [s].")
+    release_s: NonNegative = Field(0.0, description="Until it is released [s].")
     io_s: NonNegative = Field(0.0, description="Signals and the like, in all [s].")
     capture_overlaps_place: bool = Field(
         False,

@@ -51,7 +51,7 @@ class PlannerSpec(GrowingRecord):
     restart_checks: int | None = Field(
         150,
         ge=1,
-        description="A search that found nothing after so many state checks starts "
+        description="A search that found nothing after this many state checks starts "
         "over, each time with twice as many; null: it continues.",
     )
     time_limit_s: Positive = Field(

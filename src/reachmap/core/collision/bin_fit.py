@@ -33,7 +33,7 @@ WHOLE = "bin"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BinContact:
-    """What a bin meets.
+    """What a bin collides with.
 
     Attributes
     ----------
@@ -53,7 +53,7 @@ class BinContact:
     def reason(self) -> str:
         """Why the bin cannot stand there; the same text for all its parts."""
         where = " at the scan configuration" if self.at_scan else ""
-        return f"the bin meets {self.other}{where}"
+        return f"the bin collides with {self.other}{where}"
 
     @property
     def pair(self) -> str:
@@ -106,7 +106,7 @@ class BinFit:
             )
 
     def contact(self, T_base_bin: FloatArray) -> BinContact | None:
-        """First thing that the bin meets at a pose (4, 4), or None."""
+        """First thing that the bin collides with at a pose (4, 4), or None."""
         for group in self._groups:
             pair = group.first_pair(T_base_bin)
             if pair is not None:

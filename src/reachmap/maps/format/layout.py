@@ -286,7 +286,7 @@ def outcome(prefix: str, dims: tuple[str, ...]) -> tuple[Variable, ...]:
             dims=dims,
             dtype="u1",
             units="1",
-            meaning="What became of the test frame.",
+            meaning="Outcome of the test frame.",
             codes=Status,
         ),
         Variable(

@@ -34,7 +34,7 @@ from reachmap.scans.document import (
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class BaseSearch:
-    """One arm in one mounting, and what became of it."""
+    """One arm in one mounting, and its outcome."""
 
     arm: int
     mounting: int

@@ -64,7 +64,7 @@ class BaseFit:
         self._as_it_is = self._pairs(loaded, first=False)
 
     def reason_against(self, pose: Pose) -> str:
-        """What the base or a stand meets at a pose, or ""."""
+        """What the base or a stand collides with at a pose, or ""."""
         try:
             changed = self._mounting.cell_at(self._loaded, pose)
         except CellError as error:
@@ -73,7 +73,7 @@ class BaseFit:
         if not pairs:
             return ""
         first, second = sorted(pairs)[0]
-        return f"{first} meets {second}"
+        return f"{first} collides with {second}"
 
     def _pairs(self, loaded: LoadedCell, *, first: bool) -> set[tuple[str, str]]:
         """Pairs that touch and may not; the first of each moving body if that does."""

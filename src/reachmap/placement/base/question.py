@@ -70,7 +70,7 @@ class BaseQuestion:
         return f"{outside} is outside the region" if outside else self.contact(pose)
 
     def contact(self, pose: Pose) -> str:
-        """What the base would meet, or ""."""
+        """What the base would collide with, or ""."""
         return "" if self.fit is None else self.fit.reason_against(pose)
 
     def can_be_imaged(self, pose: Pose) -> bool:

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Evaluation:
-    """What became of one pose with the bin in the scene.
+    """Outcome of one pose with the bin in the scene.
 
     Attributes
     ----------

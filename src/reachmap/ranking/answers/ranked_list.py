@@ -91,7 +91,7 @@ def ranked_document(ranked: RankedList, top: int | None = None) -> dict[str, Any
     ----------
     ranked : RankedList
     top : int, optional
-        Keep only so many of the best.
+        Keep only this many of the best.
     """
     document = dict(ranked.grasps.document)
     supplied = document.pop("grasps")

@@ -169,7 +169,7 @@ class Ranker:
         max_angle_deg : float, optional
             Largest φ2 of a grasp that the map speaks about; see :class:`RankSettings`.
         invalid : {"mark", "raise"}
-            Whether rows that are no grasps get the status ``INVALID``, or an error.
+            Whether rows that are not grasps get the status ``INVALID``, or an error.
         scores : array_like, shape (n,), optional
             Break ties of J, higher first; the supplied order breaks what remains.
 
@@ -177,7 +177,7 @@ class Ranker:
         ------
         SettingsError
             Arrays that do not fit together; weights out of range; with
-            ``invalid="raise"`` also the rows that are no grasps; margins or cycles of
+            ``invalid="raise"`` also the rows that are not grasps; margins or cycles of
             a map that has none.
         """
         settings = RankSettings(

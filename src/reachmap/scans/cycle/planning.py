@@ -56,7 +56,7 @@ class CycleKnowledge:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class CyclePlan:
-    """What became of the cycle over one test grasp.
+    """Outcome of the cycle over one test grasp.
 
     Attributes
     ----------
