@@ -63,30 +63,62 @@ def connected_grasps(scene: Scene, stages: Stages) -> BinRoadmap:
     survey = _survey(scene, stages, "survey", grasp_grid(scene))
     if tool.roll == LISTED:
         return _connected(scene, stages, "connect", survey)
-    axis = scene.loaded.cell.robot.tcp.approach_axis
-    groups = RollGroups.of(grasp_grid(scene), axis, tool)
-    number = iter(range(1, len(groups.turns) + 2))
-
-    def solve(T: FloatArray) -> Survey:
-        return _survey(scene, stages, f"rolls_{next(number)}", FrameList(T=T))
-
-    survey = groups.share_goals(survey)
-    if scene.kinematics.any_roll:
-        ends = survey.way[survey.way_begin + survey.way_size - 1]
-        T_goal = scene.kinematics.forward_many(ends)
-        measured = groups.measured(survey, axis, T_goal)
-        return _connected(scene, stages, "connect", measured)
-    without = np.setdiff1d(groups.group, survey.frame)
-    survey = groups.add_rolls(survey, without, axis, solve, until_found=True)
+    rolls = _MoreRolls(scene, stages)
+    survey = rolls.groups.share_goals(survey)
+    without = np.setdiff1d(rolls.groups.group, survey.frame)
+    survey = rolls.add(survey, without, until_found=True)
     known = _connected(scene, stages, "connect", survey)
     missed = np.setdiff1d(
         survey.frame, survey.frame[np.isfinite(known.routes.length_rad)]
     )
     # One roll had a goal, but no path: perhaps another one has.
-    more = groups.add_rolls(survey, missed, axis, solve, until_found=False)
+    more = rolls.add(survey, missed, until_found=False)
     if len(more.frame) == len(survey.frame):
         return known
     return _connected(scene, stages, "connect_again", more)
+
+
+def with_more_rolls(
+    scene: Scene, known: BinRoadmap, wanted: IntArray, stages: Stages
+) -> BinRoadmap:
+    """The same with all rolls of some groups of test grasps among the goals.
+
+    Parameters
+    ----------
+    scene : Scene
+        Of a cell whose roll is free.
+    known : BinRoadmap
+    wanted : int array
+        Groups, as ``known.survey.frame`` counts them.
+    stages : Stages
+    """
+    rolls = _MoreRolls(scene, stages, "_cycle")
+    more = rolls.add(known.survey, wanted, until_found=False)
+    if len(more.frame) == len(known.survey.frame):
+        return known
+    return _connected(scene, stages, "connect_cycle", more)
+
+
+class _MoreRolls:
+    """Solves for rolls that are not listed, in stages of their own."""
+
+    def __init__(self, scene: Scene, stages: Stages, suffix: str = "") -> None:
+        cell = scene.loaded.cell
+        self._scene, self._stages, self._suffix = scene, stages, suffix
+        self._axis = cell.robot.tcp.approach_axis
+        self.groups = RollGroups.of(grasp_grid(scene), self._axis, cell.tool)
+        self._number = 0
+
+    def add(self, survey: Survey, wanted: IntArray, *, until_found: bool) -> Survey:
+        """See :meth:`RollGroups.add_rolls`."""
+        return self.groups.add_rolls(
+            survey, wanted, self._axis, self._solve, until_found=until_found
+        )
+
+    def _solve(self, T: FloatArray) -> Survey:
+        self._number += 1
+        phase = f"rolls{self._suffix}_{self._number}"
+        return _survey(self._scene, self._stages, phase, FrameList(T=T))
 
 
 def _survey(

@@ -31,7 +31,7 @@ from reachmap.scans.bin_roadmap import (
 from reachmap.scans.cycle.planning import CycleKnowledge, CyclePlanner
 from reachmap.scans.cycle.results import CycleResults
 from reachmap.scans.cycle.scenes import CycleScenes, stages_of
-from reachmap.scans.cycle.stages import knowledge_of
+from reachmap.scans.cycle.stages import whole_cycles
 from reachmap.scans.document import journal_settings
 from reachmap.scans.ik_survey import Survey
 from reachmap.scans.margins import MarginMeter
@@ -144,12 +144,10 @@ def planning_job(scene: Scene, body_pairs: tuple[str, ...], stages: Stages) -> J
     known, cycles = [], []
     for k, filling in enumerate(fillings):
         one = stages if len(fillings) == 1 else _OneFilling(stages, f"_fill_{k}")
-        known.append(connected_grasps(Scene.shared(filling, with_bin=True), one))
-        cycles.append(
-            knowledge_of(filling, known[-1], body_pairs, one)
-            if filling.cell.held()
-            else None
-        )
+        way_in = connected_grasps(Scene.shared(filling, with_bin=True), one)
+        way_in, after = whole_cycles(filling, way_in, body_pairs, one)
+        known.append(way_in)
+        cycles.append(after)
     whole = BinContext(
         fillings=fillings,
         known=tuple(known),

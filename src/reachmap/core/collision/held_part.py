@@ -41,12 +41,15 @@ class HeldPart:
         Corners of its convex hull in the TCP frame [m].
     touch : tuple of str
         Links and bodies that it may touch.
+    is_round : bool
+        Whether a turn about the approach axis changes nothing.
     """
 
     solid: Solid
     T_tcp_part: FloatArray
     points: FloatArray
     touch: tuple[str, ...]
+    is_round: bool
 
     @classmethod
     def of(cls, loaded: LoadedCell) -> HeldPart | None:
@@ -64,10 +67,17 @@ class HeldPart:
         solid, T = _solid(loaded, key, spec), spec.pose.matrix()
         points = _hull_corners(triangles_of(solid).vertices @ T[:3, :3].T + T[:3, 3])
         column = AXES[loaded.cell.robot.tcp.approach_axis][0]
-        if spec.yaw == "free" and not _is_round_about(spec, T, column):
+        is_round = _is_round_about(spec, T, column)
+        if spec.yaw == "free" and not is_round:
             points = swept_points(points, column)
-            solid, T = ConvexBody(points=points), np.eye(4)
-        return cls(solid=solid, T_tcp_part=T, points=points, touch=spec.touch)
+            solid, T, is_round = ConvexBody(points=points), np.eye(4), True
+        return cls(
+            solid=solid,
+            T_tcp_part=T,
+            points=points,
+            touch=spec.touch,
+            is_round=is_round,
+        )
 
 
 def _solid(loaded: LoadedCell, key: str, spec: PartSpec) -> Solid:

@@ -72,7 +72,11 @@ class LiftContext:
 
 
 def lift_in_stages(
-    loaded: LoadedCell, known: BinRoadmap, body_pairs: tuple[str, ...], stages: Stages
+    loaded: LoadedCell,
+    known: BinRoadmap,
+    body_pairs: tuple[str, ...],
+    stages: Stages,
+    phase: str,
 ) -> LiftSurvey:
     """Lift the part from every goal of the grasps that are reached."""
     survey = known.survey
@@ -83,7 +87,7 @@ def lift_in_stages(
     ends = survey.way[survey.way_begin + survey.way_size - 1]
     context = LiftContext(loaded=loaded, body_pairs=body_pairs, Q=ends[rows])
     payloads = stages.run(
-        "lift",
+        phase,
         Job(function=lift_unit, prepare=prepare, context=context),
         [(part.start, part.stop) for part in blocks(len(rows), LIFTS_PER_UNIT)],
     )

@@ -97,7 +97,7 @@ def find_places(
     status, pairs = [], []
     found: list[tuple[int, FloatArray, FloatArray]] = []
     for number, spec in enumerate(cell.drop_offs):
-        ways, pair = _ways_to(scenes, spec)
+        ways, pair = ways_to_place(scenes, spec)
         status.append(
             StageStatus.PATH_FOUND if ways else StageStatus.DROP_OFF_UNREACHABLE
         )
@@ -146,7 +146,7 @@ def _frame(cell: Cell, name: str) -> FloatArray:
     return np.asarray(frames[body.attach_to] @ body.pose.matrix())
 
 
-def _ways_to(
+def ways_to_place(
     scenes: CycleScenes, spec: DropOffSpec
 ) -> tuple[list[tuple[FloatArray, FloatArray]], str]:
     """Straight ways in with the part and out without; or the bodies in the way."""
