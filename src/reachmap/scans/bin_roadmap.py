@@ -65,6 +65,12 @@ def connected_grasps(scene: Scene, stages: Stages) -> BinRoadmap:
         return _connected(scene, stages, "connect", survey)
     rolls = _MoreRolls(scene, stages)
     survey = rolls.groups.share_goals(survey)
+    if scene.kinematics.any_roll:
+        ends = survey.way[survey.way_begin + survey.way_size - 1]
+        T_goal = scene.kinematics.forward_many(ends)
+        axis = scene.loaded.cell.robot.tcp.approach_axis
+        measured = rolls.groups.measured(survey, axis, T_goal)
+        return _connected(scene, stages, "connect", measured)
     without = np.setdiff1d(rolls.groups.group, survey.frame)
     survey = rolls.add(survey, without, until_found=True)
     known = _connected(scene, stages, "connect", survey)
@@ -92,6 +98,8 @@ def with_more_rolls(
         Groups, as ``known.survey.frame`` counts them.
     stages : Stages
     """
+    if scene.kinematics.any_roll:
+        return known  # the arm has no other
     rolls = _MoreRolls(scene, stages, "_cycle")
     more = rolls.add(known.survey, wanted, until_found=False)
     if len(more.frame) == len(known.survey.frame):

@@ -177,7 +177,8 @@ class ClearanceMeter:
         return distance
 
     def _measure(self, geometry: Any, data: Any, pair: int) -> float:
-        return float(pin.computeDistance(geometry, data, pair).min_distance)
+        # The last bits depend on what else the process has done: a map may not.
+        return round(float(pin.computeDistance(geometry, data, pair).min_distance), 12)
 
     def _differs(self, pair: Any) -> bool:
         """Whether a body of the pair is more than its hull."""
