@@ -20,6 +20,7 @@ from reachmap.cell.loading import LoadedCell
 from reachmap.core.scene import Scene
 from reachmap.geometry import AXES
 from reachmap.maps import BinMap, read_bin_map
+from reachmap.maps.provenance import cell_of_artefact
 from reachmap.picking.emptying import Fate, empty_heap
 from reachmap.picking.heap import Heap, drop_heap
 from reachmap.ranking.lookup.approach import complete_rotation
@@ -27,7 +28,6 @@ from reachmap.ranking.lookup.ranker import Ranker
 from reachmap.sampling.frames import approach_distance_m
 from reachmap.scans.ik_survey import survey_frames
 from reachmap.tools.empty import FILL, part_costs
-from reachmap.tools.options import cell_of_artefact
 
 SEED = 100
 

@@ -24,14 +24,15 @@ from reachmap.core.robot.model import RobotModel
 from reachmap.core.scene import Scene
 from reachmap.geometry import yaw_transform
 from reachmap.maps import BinPlacement, Status, read_placement, read_workspace_map
+from reachmap.maps.provenance import cell_of_artefact
 from reachmap.placement.mapped.evaluator import Evaluation, open_evaluator
 from reachmap.placement.mapped.exact import PlacedScene, Pose
 from reachmap.placement.mapped.imaging import imaging_configurations
 from reachmap.placement.mapped.sample import THIN, Grid, open_frames, sample_of
 from reachmap.placement.predicted.region import Region, region_of
+from reachmap.runtime.options import RunOptions
 from reachmap.runtime.progress import Progress
 from reachmap.tools.bin_scan import bin_scan
-from reachmap.tools.options import RunOptions, cell_of_artefact
 from reachmap.tools.place_bin import PlacementChoice, place_bin
 from reachmap.tools.workspace_scan import workspace_scan
 

@@ -14,9 +14,9 @@ from ruamel.yaml import YAML
 from reachmap.cli import group
 from reachmap.core.scene import Scene
 from reachmap.maps import read_bin_map, write_bin_map
+from reachmap.maps.provenance import cell_of_artefact
 from reachmap.motions.motion import best_rows, trapezoid
 from reachmap.tools.bin_scan import bin_scan
-from reachmap.tools.options import cell_of_artefact
 from tests.support.dense_checks import DenseCheck, dense_free
 from tests.support.exported_motions import READERS
 from tests.support.toy_artefacts import toy_bin_map

@@ -16,7 +16,7 @@ from reachmap.cli import group
 from reachmap.core.scene import Scene
 from reachmap.geometry import yaw_transform
 from reachmap.maps import read_bin_map, read_placement
-from reachmap.tools.options import cell_of_artefact
+from reachmap.maps.provenance import cell_of_artefact
 from reachmap.tools.workspace_scan import workspace_scan
 from tests.support.dense_checks import dense_free
 from tests.support.optional import present

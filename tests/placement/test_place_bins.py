@@ -12,7 +12,7 @@ from reachmap.cell.loading import read_cell
 from reachmap.cli import group
 from reachmap.geometry import inverse_transform
 from reachmap.maps import read_bin_map, read_placement
-from reachmap.tools.options import cell_of_artefact
+from reachmap.maps.provenance import cell_of_artefact
 from reachmap.tools.workspace_scan import workspace_scan
 
 SPEC = "{inner: [0.2, 0.12, 0.04], wall: 0.01, pose: {xyz: [%s, 0.35, -0.2]}}"

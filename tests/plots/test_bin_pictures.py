@@ -14,6 +14,7 @@ from reachmap.cell.model.orientations import ConeFamily
 from reachmap.geometry import yaw_transform
 from reachmap.maps.records import Status
 from reachmap.maps.summary.directions import reached_shares
+from reachmap.maps.summary.statistics import causes_of, saturation_of, wilson_interval
 from reachmap.plots.approach import STATUS_COLOURS, draw_approach, sunburst_sectors
 from reachmap.plots.bin_map import (
     draw_clearance,
@@ -21,12 +22,8 @@ from reachmap.plots.bin_map import (
     draw_directions,
     draw_reachability,
 )
-from reachmap.plots.causes import causes_of, draw_causes
-from reachmap.plots.curves.saturation import (
-    draw_saturation,
-    saturation_of,
-    wilson_interval,
-)
+from reachmap.plots.causes import draw_causes
+from reachmap.plots.curves.saturation import draw_saturation
 from reachmap.plots.parts.bin_view import percent_after
 from reachmap.plots.parts.squares import percent_text
 from reachmap.plots.placement import draw_placement, placement_words

@@ -11,15 +11,14 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from reachmap.maps.records import Status, WorkspaceMap
+from reachmap.maps.summary.statistics import best_level, level_means
 from reachmap.plots.heatmap import best_frames, draw_level
 from reachmap.plots.overview import draw_overview
 from reachmap.plots.parts.levels import (
     QUANTITIES,
     Quantity,
-    best_level,
     best_patch,
     best_square,
-    level_means,
     level_names,
     quantity_values,
 )

@@ -8,9 +8,9 @@ import pytest
 from reachmap.core.planning.timing import execution_time_s, path_length_rad
 from reachmap.geometry import rotation_angle, rotation_from_quaternion_wxyz
 from reachmap.maps import Status, read_bin_map
+from reachmap.runtime.options import RunOptions
 from reachmap.tools.bin_scan import bin_scan, estimate_bin_scan, summary_of_bin
 from reachmap.tools.merge import merge
-from reachmap.tools.options import RunOptions
 from tests.support.dense_checks import dense_free
 from tests.support.scenes import scene_of
 

@@ -13,10 +13,10 @@ from reachmap.core.scene import Scene
 from reachmap.errors import CellError
 from reachmap.maps import read_bin_map
 from reachmap.placement.mapped.sample import open_frames
+from reachmap.runtime.options import RunOptions
 from reachmap.sampling.frames import bin_test_frames
 from reachmap.tools.bin_scan import bin_scan
 from reachmap.tools.merge import merge
-from reachmap.tools.options import RunOptions
 from reachmap.validation.picks import NO_PICKS
 from reachmap.validation.planning import PickContext
 

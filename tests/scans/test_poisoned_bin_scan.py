@@ -7,9 +7,9 @@ import pytest
 
 from reachmap.errors import IncompleteError
 from reachmap.maps import Status, read_bin_map
+from reachmap.runtime.options import RunOptions
 from reachmap.scans.bin_scan import GRASPS_PER_UNIT
 from reachmap.tools import bin_scan as tool
-from reachmap.tools.options import RunOptions
 from tests.support import poisoned_bin
 
 FEW = ("bin_scan.grid=[3,2]", "bin_scan.repeats=1", "bin_scan.approach_distance_m=0")

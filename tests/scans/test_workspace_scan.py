@@ -8,7 +8,7 @@ import pytest
 from reachmap.errors import ReachmapError
 from reachmap.geometry import rotation_from_quaternion_wxyz
 from reachmap.maps import Status, read_workspace_map
-from reachmap.tools.options import RunOptions
+from reachmap.runtime.options import RunOptions
 from reachmap.tools.workspace_scan import (
     estimate_workspace_scan,
     summary_of_workspace,

@@ -9,8 +9,8 @@ import numpy as np
 
 from reachmap.cell.model.orientations import ConeFamily
 from reachmap.geometry import quaternion_wxyz_from_rotation, yaw_transform
-from reachmap.maps.parts import Effort
-from reachmap.maps.records import BinMap, PathStore, Provenance, Stamp, Status
+from reachmap.maps.parts import Effort, PathStore
+from reachmap.maps.records import BinMap, Provenance, Stamp, Status
 from reachmap.sampling.orientations import orientation_set
 
 BODY_PAIRS = ("camera housing | bin wall +x", "gripper | bin bottom")

@@ -20,12 +20,12 @@ from reachmap.cell.text.expressions import resolve_expressions
 from reachmap.cell.text.yaml_reader import parse_yaml
 from reachmap.geometry import quaternion_wxyz_from_rotation, yaw_transform
 from reachmap.maps.format.checks import path_lengths
+from reachmap.maps.parts import PathStore
 from reachmap.maps.records import (
     NO_PAIR,
     BinMap,
     BinPlacement,
     CubeMap,
-    PathStore,
     Provenance,
     RunInfo,
     Stamp,

@@ -9,7 +9,7 @@ import pytest
 
 from reachmap.maps import Status, read_bin_map
 from reachmap.ranking import RankSettings
-from reachmap.tools.options import RunOptions
+from reachmap.runtime.options import RunOptions
 from reachmap.tools.validate import PickOptions, validate
 from tests.support.optional import present
 from tests.support.toy_truth import clear_rows, slack_of, toy_grasps

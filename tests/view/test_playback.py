@@ -7,8 +7,8 @@ import pytest
 
 from reachmap.core.collision.solids import SolidCell
 from reachmap.errors import SettingsError
+from reachmap.maps.provenance import cell_of_artefact
 from reachmap.motions.motion import way_points
-from reachmap.tools.options import cell_of_artefact
 from reachmap.view.playback import (
     Playback,
     choose_paths,

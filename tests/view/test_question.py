@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from reachmap.core.scene import Scene
+from reachmap.maps.provenance import cell_of_artefact
 from reachmap.maps.records import Status
-from reachmap.tools.options import cell_of_artefact
 from reachmap.view.inspect_frame import answer, best_first
 from reachmap.view.points import MapPoints, points_of
 from tests.support.toy_artefacts import toy_bin_map, toy_workspace

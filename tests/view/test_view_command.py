@@ -22,7 +22,7 @@ from reachmap.cli import group
 from reachmap.core.collision.solids import SolidCell
 from reachmap.errors import MissingExtraError
 from reachmap.maps import write_bin_map, write_workspace_map
-from reachmap.tools.options import cell_of_artefact
+from reachmap.maps.provenance import cell_of_artefact
 from reachmap.tools.view import ViewOptions, view
 from reachmap.view.inspect_frame import best_first
 from tests.support.synthetic_maps import synthetic_placement

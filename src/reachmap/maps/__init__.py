@@ -13,13 +13,13 @@ from reachmap.maps.format.placement import read_placement, write_placement
 from reachmap.maps.format.registry import read_provenance
 from reachmap.maps.format.store import artefact_kind
 from reachmap.maps.format.workspace import read_workspace_map, write_workspace_map
+from reachmap.maps.parts import PathStore
 from reachmap.maps.provenance import RunClock, collect_provenance
 from reachmap.maps.records import (
     NO_PAIR,
     BinMap,
     BinPlacement,
     CubeMap,
-    PathStore,
     Provenance,
     RunInfo,
     Stamp,

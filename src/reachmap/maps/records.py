@@ -18,9 +18,9 @@ from reachmap.maps.parts import (
     Cycle,
     Effort,
     Margins,
+    PathStore,
+    freeze,
 )
-from reachmap.maps.parts import PathStore as PathStore
-from reachmap.maps.parts import freeze as freeze
 from reachmap.sampling.lattice import Lattice, Stitching, pooled_percent, stitch
 
 NO_PAIR = -1

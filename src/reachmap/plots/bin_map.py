@@ -13,15 +13,8 @@ from matplotlib.figure import Figure
 from reachmap._typing import FloatArray
 from reachmap.maps.records import BinMap
 from reachmap.maps.summary.directions import reachability_of_directions
-from reachmap.maps.summary.statistics import are_independent
-from reachmap.plots.parts.bin_view import (
-    BinView,
-    attempted,
-    found_after,
-    frame_bin,
-    percent_after,
-    view_of,
-)
+from reachmap.maps.summary.statistics import are_independent, attempted, found_after
+from reachmap.plots.parts.bin_view import BinView, frame_bin, percent_after, view_of
 from reachmap.plots.parts.squares import (
     MISSING,
     PERCENT_SCALE,

@@ -7,8 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from reachmap.maps.records import BinMap, Status, WorkspaceMap
-from reachmap.maps.summary.statistics import STATUS_NAMES
-from reachmap.maps.summary.statistics import causes_of as causes_of
+from reachmap.maps.summary.statistics import STATUS_NAMES, causes_of
 from reachmap.plots.approach import STATUS_COLOURS
 from reachmap.plots.parts.context import context_of
 from reachmap.plots.parts.style import (

@@ -14,8 +14,9 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 
 from reachmap._typing import BoolArray, FloatArray
+from reachmap.maps.summary.statistics import level_means
 from reachmap.plots.overview import sheet_columns
-from reachmap.plots.parts.levels import level_means, level_names
+from reachmap.plots.parts.levels import level_names
 from reachmap.plots.parts.outlines import Outline, draw_outline, legend_lines
 from reachmap.plots.parts.squares import (
     MINUS,

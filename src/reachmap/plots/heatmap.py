@@ -13,12 +13,8 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
 from matplotlib.patheffects import withStroke
 
-from reachmap.plots.parts.levels import (
-    QUANTITY_NAMES,
-    best_level,
-    best_patch,
-    best_square,
-)
+from reachmap.maps.summary.statistics import best_level
+from reachmap.plots.parts.levels import QUANTITY_NAMES, best_patch, best_square
 from reachmap.plots.parts.outlines import draw_outline, legend_lines
 from reachmap.plots.parts.squares import (
     PERCENT_SCALE,

@@ -7,8 +7,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from reachmap._typing import FloatArray
+from reachmap.maps.summary.statistics import best_level, level_means
 from reachmap.plots.heatmap import draw_level_on, is_marked
-from reachmap.plots.parts.levels import QUANTITY_NAMES, best_level, level_means
+from reachmap.plots.parts.levels import QUANTITY_NAMES
 from reachmap.plots.parts.outlines import legend_lines
 from reachmap.plots.parts.squares import colour_bar
 from reachmap.plots.parts.stack import LevelStack, best_text, height_text, mean_text

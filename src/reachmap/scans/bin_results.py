@@ -19,8 +19,9 @@ from reachmap.maps.parts import (
     Components,
     Effort,
     Margins,
+    freeze,
 )
-from reachmap.maps.records import NO_PAIR, freeze
+from reachmap.maps.records import NO_PAIR
 from reachmap.sampling.frames import approach_distance_m, bin_test_frames
 from reachmap.scans.cycle.results import CycleResults
 from reachmap.scans.document import provenance_from_document

@@ -18,7 +18,8 @@ from reachmap.core.planning.approach import StraightApproach
 from reachmap.core.planning.roadmap import Goals
 from reachmap.core.scene import Scene
 from reachmap.geometry import axis_vector
-from reachmap.maps.records import NO_PAIR, Status, freeze
+from reachmap.maps.parts import freeze
+from reachmap.maps.records import NO_PAIR, Status
 from reachmap.runtime.job import Job, Stages
 from reachmap.sampling.frames import FrameGrid, FrameList
 

@@ -18,8 +18,7 @@ from reachmap.maps import (
     WorkspaceMap,
     workspace_map_from_cubes,
 )
-from reachmap.maps.parts import Components
-from reachmap.maps.records import freeze
+from reachmap.maps.parts import Components, freeze
 from reachmap.sampling.frames import CubeFrames, workspace_frames
 from reachmap.scans.document import provenance_from_document
 

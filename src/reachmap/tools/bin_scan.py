@@ -19,6 +19,7 @@ from reachmap.maps import (
     read_workspace_map,
 )
 from reachmap.maps.base.format import read_base
+from reachmap.maps.provenance import cell_of_artefact
 from reachmap.maps.summary.clearance import clearance_shares
 from reachmap.runtime.job import Work
 from reachmap.runtime.options import IN_PROCESS, RunOptions
@@ -30,7 +31,7 @@ from reachmap.scans.cycle.part_fit import require_room_for_part
 from reachmap.scans.cycle.scenes import CycleScenes, stages_of
 from reachmap.scans.document import checking_settings, scan_document
 from reachmap.scans.ik_survey import survey_frames
-from reachmap.tools.options import cell_of_artefact, warn_of_nothing, with_seed
+from reachmap.tools.options import warn_of_nothing, with_seed
 from reachmap.tools.prologue import (
     check_scan_output,
     path_of_cell,

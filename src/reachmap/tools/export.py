@@ -10,10 +10,10 @@ from reachmap.core.robot.model import RobotModel
 from reachmap.errors import SettingsError
 from reachmap.maps import read_bin_map
 from reachmap.maps.bytes.publish import check_outputs, publish
+from reachmap.maps.provenance import cell_of_artefact
 from reachmap.maps.records import BinMap
 from reachmap.motions.formats import WRITERS, Origin
 from reachmap.motions.motion import Motion, best_rows, motion_of, row_of
-from reachmap.tools.options import cell_of_artefact
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -7,12 +7,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from reachmap.maps import BinMap, WorkspaceMap
-from reachmap.maps.provenance import cell_of_artefact
 from reachmap.maps.summary.nothing import why_nothing
 from reachmap.runtime.options import RunOptions
 from reachmap.runtime.store import store_path
-
-__all__ = ["RunOptions", "cell_of_artefact", "with_seed", "written_by"]
 
 logger = logging.getLogger(__name__)
 

@@ -27,6 +27,7 @@ from reachmap.maps import (
     write_placement,
 )
 from reachmap.maps.bytes.publish import check_picture
+from reachmap.maps.provenance import cell_of_artefact
 from reachmap.maps.records import Stamp
 from reachmap.maps.summary.upright import upright_workspace
 from reachmap.placement.decision import (
@@ -56,7 +57,7 @@ from reachmap.scans.document import (
     provenance_from_document,
     scan_document,
 )
-from reachmap.tools.options import cell_of_artefact, with_seed
+from reachmap.tools.options import with_seed
 from reachmap.tools.placement_picture import draw_placed
 from reachmap.tools.prologue import refuse_cell_files
 

@@ -20,8 +20,9 @@ from reachmap.maps import (
     write_placement,
 )
 from reachmap.maps.bytes.publish import check_picture
+from reachmap.maps.provenance import cell_of_artefact
 from reachmap.runtime.options import IN_PROCESS, RunOptions
-from reachmap.tools.options import cell_of_artefact, with_seed
+from reachmap.tools.options import with_seed
 from reachmap.tools.place_bin import (
     PlacedBin,
     PlacementChoice,

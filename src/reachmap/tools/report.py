@@ -7,9 +7,9 @@ from pathlib import Path
 from reachmap.cell.loaded import LoadedCell
 from reachmap.errors import CellError
 from reachmap.maps.bytes.publish import check_outputs, publish
+from reachmap.maps.provenance import cell_of_artefact
 from reachmap.report.folder import RunFolder, read_run_folder, usual_files
 from reachmap.report.page import report_page
-from reachmap.tools.options import cell_of_artefact
 
 
 def report(folder: Path, *, output: Path, overwrite: bool = False) -> Path:

@@ -21,13 +21,13 @@ from reachmap.maps import (
     read_bin_map,
 )
 from reachmap.maps.bytes.publish import check_picture
+from reachmap.maps.provenance import cell_of_artefact
 from reachmap.maps.robustness.format import write_robustness
 from reachmap.maps.robustness.record import Certificate, Robustness
 from reachmap.motions.motion import best_rows
 from reachmap.robustness.errors import Errors, ErrorSize, unit_errors
 from reachmap.robustness.problem import RobustnessProblem, certificates, replayed
 from reachmap.runtime.options import IN_PROCESS, RunOptions
-from reachmap.tools.options import cell_of_artefact
 from reachmap.tools.prologue import refuse_cell_files
 
 SCALES = np.array([0.0, 0.25, 0.5, 1.0, 1.5, 2.0])

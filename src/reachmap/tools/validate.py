@@ -15,6 +15,7 @@ import numpy as np
 from reachmap.errors import GraspListError, SettingsError
 from reachmap.maps import read_bin_map
 from reachmap.maps.bytes.publish import check_outputs, check_picture, publish
+from reachmap.maps.provenance import cell_of_artefact
 from reachmap.maps.records import BinMap
 from reachmap.ranking.answers.pipeline import pose_from_numbers, rank_list
 from reachmap.ranking.answers.ranked_list import RankedList
@@ -26,7 +27,6 @@ from reachmap.runtime.options import IN_PROCESS, RunOptions
 from reachmap.runtime.progress import Progress
 from reachmap.sampling.frames import approach_distance_m
 from reachmap.scans.bin_scan import pairs_of_fillings
-from reachmap.tools.options import cell_of_artefact
 from reachmap.tools.prologue import refuse_cell_files
 from reachmap.tools.rank import ListFormat, ranker_of, read_list
 from reachmap.validation.calibration import calibrate as fit_calibration

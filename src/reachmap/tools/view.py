@@ -14,10 +14,10 @@ from reachmap.errors import SettingsError
 from reachmap.maps.base.record import BasePlacement
 from reachmap.maps.bytes.publish import check_outputs, publish
 from reachmap.maps.format.registry import Artefact, kind_of, read_artefact
+from reachmap.maps.provenance import cell_of_artefact
 from reachmap.maps.records import BinMap
 from reachmap.maps.robustness.record import Robustness
 from reachmap.maps.study.record import Study
-from reachmap.tools.options import cell_of_artefact
 from reachmap.tools.prologue import path_of_cell, refuse_cell_files
 from reachmap.view.engine import HOST, require_viewer, start_server, stop_server
 from reachmap.view.guard import Guard

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from reachmap._typing import BoolArray, CodeArray, FloatArray, IntArray
-from reachmap.maps.records import BinMap, freeze
+from reachmap.maps.parts import freeze
+from reachmap.maps.records import BinMap
 from reachmap.ranking.answers.ranked_list import QUADRANT_ORDER, RankedList
 from reachmap.ranking.lookup.order import OUTSIDE_MAP
 from reachmap.ranking.lookup.ranker import Ranker

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from reachmap._typing import BoolArray, FloatArray, IntArray
 from reachmap.geometry import rotation_from_quaternion_wxyz, transform_from_parts
-from reachmap.maps.records import freeze
+from reachmap.maps.parts import freeze
 from reachmap.ranking.answers.ranked_list import RankedList
 from reachmap.ranking.lookup.approach import align
 

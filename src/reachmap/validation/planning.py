@@ -14,7 +14,8 @@ from reachmap.core.kinematics.windings import Windings
 from reachmap.core.planning.planner import PlanResult
 from reachmap.core.scene import Scene
 from reachmap.geometry import inverse_transform
-from reachmap.maps.records import NO_PAIR, Status, freeze
+from reachmap.maps.parts import freeze
+from reachmap.maps.records import NO_PAIR, Status
 from reachmap.runtime.job import Job
 from reachmap.runtime.options import RunOptions
 from reachmap.runtime.progress import Progress

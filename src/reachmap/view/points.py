@@ -9,7 +9,8 @@ import numpy as np
 
 from reachmap._typing import BoolArray, CodeArray, FloatArray, IntArray
 from reachmap.maps.format.registry import Artefact
-from reachmap.maps.records import BinMap, BinPlacement, Status, WorkspaceMap, freeze
+from reachmap.maps.parts import freeze
+from reachmap.maps.records import BinMap, BinPlacement, Status, WorkspaceMap
 from reachmap.maps.summary.statistics import STATUS_NAMES
 from reachmap.plots.parts.levels import level_names
 

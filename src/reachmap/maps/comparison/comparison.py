@@ -24,7 +24,8 @@ from reachmap.maps.comparison.significance import (
     fisher_exact,
     mcnemar_exact,
 )
-from reachmap.maps.records import BinMap, Provenance, Status, WorkspaceMap, freeze
+from reachmap.maps.parts import freeze
+from reachmap.maps.records import BinMap, Provenance, Status, WorkspaceMap
 from reachmap.maps.summary.statistics import STATUS_NAMES
 from reachmap.sampling.lattice import merge_coordinates
 

@@ -15,7 +15,8 @@ from reachmap._typing import CodeArray, FloatArray, IntArray
 from reachmap.cell.model.fields import PoseSpec
 from reachmap.errors import SettingsError
 from reachmap.geometry import inverse_transform, rotation_from_quaternion_wxyz
-from reachmap.maps.records import BinMap, Status, WorkspaceMap, freeze
+from reachmap.maps.parts import freeze
+from reachmap.maps.records import BinMap, Status, WorkspaceMap
 
 Frame: TypeAlias = Literal["robot_base", "bin", "world"]
 

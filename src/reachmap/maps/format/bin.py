@@ -29,7 +29,8 @@ from reachmap.maps.format.layout import (
 )
 from reachmap.maps.format.sections import BIN_SECTIONS
 from reachmap.maps.format.store import RecordFile
-from reachmap.maps.records import BinMap, PathStore
+from reachmap.maps.parts import PathStore
+from reachmap.maps.records import BinMap
 from reachmap.maps.summary.directions import reachability_of_directions
 
 INDEX_COLUMNS = ("layer", "y", "x", "orientation", "repeat")

@@ -7,9 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from reachmap.maps.records import BinMap
-from reachmap.maps.summary.statistics import Saturation
-from reachmap.maps.summary.statistics import saturation_of as saturation_of
-from reachmap.maps.summary.statistics import wilson_interval as wilson_interval
+from reachmap.maps.summary.statistics import Saturation, saturation_of
 from reachmap.plots.parts.bin_view import view_of
 from reachmap.plots.parts.style import (
     BIN_COLOUR,

@@ -11,8 +11,7 @@ from matplotlib.patches import FancyArrowPatch, Rectangle
 from reachmap._typing import FloatArray
 from reachmap.geometry import inverse_transform
 from reachmap.maps.records import BinMap
-from reachmap.maps.summary.statistics import attempted as attempted
-from reachmap.maps.summary.statistics import found_after as found_after
+from reachmap.maps.summary.statistics import attempted, found_after
 from reachmap.plots.parts.context import context_of
 from reachmap.plots.parts.squares import cell_edges
 from reachmap.plots.parts.style import BIN_COLOUR, INK

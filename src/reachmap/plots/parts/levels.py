@@ -9,8 +9,6 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from reachmap._typing import FloatArray
 from reachmap.maps.records import WorkspaceMap
-from reachmap.maps.summary.statistics import best_level as best_level
-from reachmap.maps.summary.statistics import level_means as level_means
 
 Quantity: TypeAlias = Literal["path", "ik", "ik-free", "difference"]
 QUANTITIES: tuple[Quantity, ...] = ("path", "ik", "ik-free", "difference")

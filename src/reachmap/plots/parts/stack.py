@@ -9,12 +9,11 @@ from matplotlib.colors import Colormap
 
 from reachmap._typing import FloatArray
 from reachmap.maps.records import WorkspaceMap
+from reachmap.maps.summary.statistics import best_level, level_means
 from reachmap.plots.parts.context import context_of, levels_of, patch_shape
 from reachmap.plots.parts.levels import (
     QUANTITY_NAMES,
     Quantity,
-    best_level,
-    level_means,
     level_names,
     quantity_values,
 )

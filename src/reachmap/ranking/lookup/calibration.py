@@ -17,7 +17,8 @@ import numpy as np
 
 from reachmap._typing import FloatArray
 from reachmap.errors import MapFileError
-from reachmap.maps.records import Stamp, freeze
+from reachmap.maps.parts import freeze
+from reachmap.maps.records import Stamp
 
 logger = logging.getLogger(__name__)
 

@@ -16,7 +16,8 @@ from reachmap.geometry import (
     rotation_from_quaternion_wxyz,
 )
 from reachmap.maps.bytes.hashing import canonical_array
-from reachmap.maps.records import BinMap, Status, freeze
+from reachmap.maps.parts import freeze
+from reachmap.maps.records import BinMap, Status
 from reachmap.ranking.lookup.approach import axis_vector
 from reachmap.ranking.lookup.settings import QUANTILE, CostBasis
 from reachmap.ranking.terms.margins import margin_terms, margin_values

@@ -13,8 +13,8 @@ import numpy as np
 
 from reachmap._typing import BoolArray, CodeArray, FloatArray
 from reachmap.maps.cycle.seconds import cycle_parts, failing_stage
-from reachmap.maps.parts import StageStatus
-from reachmap.maps.records import BinMap, freeze
+from reachmap.maps.parts import StageStatus, freeze
+from reachmap.maps.records import BinMap
 
 PLANNING, FAILURE = "planning_s", "failure_s"
 
