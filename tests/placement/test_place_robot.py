@@ -244,3 +244,21 @@ def test_a_fragment_that_is_none_is_refused(tmp_path):
     fragment.write_text("robots: {urdf: x.urdf}\n")
     with pytest.raises(CellError, match=r"arm.yaml: robots: .*'robot'"):
         placed(tmp_path, choice=RobotChoice(arms=(Path(fragment),)))
+
+
+def test_places_out_of_reach_of_the_drop_off_are_excluded(tmp_path: Path) -> None:
+    """The toy reaches 0.7 m; the drop-off stays in the world, 1 m from the bin."""
+    at = [0.75, 0.35, 0.0]
+    placement = placed(
+        tmp_path,
+        f"drop_off={json.dumps({'pose': {'xyz': at, 'rpy_deg': [0, 0, 0]}})}",
+    )
+    no_way = np.array(placement.reason) == "no drop-off can be reached"
+    away = np.linalg.norm(placement.candidate_position[:, :2] - at[:2], axis=1)
+    assert no_way[away > 0.71].all()
+    # What a base link meets comes first as a reason.
+    free = ~np.isnan(placement.score)
+    assert (away[free] <= 0.7 + 1e-6).all()
+    assert no_way.any()
+    assert free.any()
+    assert away[placement.chosen] <= 0.7 + 1e-6

@@ -174,7 +174,7 @@ def test_nothing_is_called_nothing_and_an_effect_an_effect(
     # Rows: (0.10, 0.01), (0.10, 0.035), (0.14, 0.01), (0.14, 0.035).
     assert made.significant[:, 0].tolist() == [0, 1, 0, 1]
     assert made.gained[2, 0] == made.lost[2, 0] == 0
-    assert "not distinguishable, +0.0 points" in sentence(made, 2, 0)
+    assert "+0.0 points, not distinguishable from" in sentence(made, 2, 0)
     assert sentence(made, 1, 0).startswith(f"{RADIUS} 0.01 → 0.035: level_average −")
     nothing, effect = (main_effect(made, k, 0).mean for k in range(2))
     assert nothing[0] == nothing[1]

@@ -85,9 +85,22 @@ def seen_from(loaded: LoadedCell, T_world_frame: FloatArray) -> LoadedCell:
             "robot": cell.robot.model_copy(update={"base_pose": base, "mount": None}),
             "bin": _bin_in_world(cell, T @ T_world_bin_of(cell)),
             "workspace_scan": cell.workspace_scan.model_copy(update={"frame": WORLD}),
+            "drop_off": _seen_drop_offs(cell, T),
         }
     )
     return _rebuilt(loaded, moved)
+
+
+def _seen_drop_offs(cell: Cell, T: FloatArray) -> Any:
+    """Drop-offs whose poses are in the world, seen from the new one."""
+    if cell.drop_off is None:
+        return None
+    return tuple(
+        spec.model_copy(update={"pose": pose_of(T @ spec.pose.matrix())})
+        if spec.pose is not None and spec.frame == WORLD
+        else spec
+        for spec in cell.drop_offs
+    )
 
 
 def with_base_at(

@@ -162,19 +162,18 @@ def sentence(study: Study, row: int, objective: int) -> str:
     name = study.objective_names[objective]
     word = CHANGE_WORDS[OBJECTIVES[name]]
     digits = 1 if word == "points" else 3
-    change, low, high = (
-        _signed(float(array[row, objective]), digits)
-        for array in (study.change, study.change_low, study.change_high)
-    )
+    middle = float(study.change[row, objective])
+    change = _signed(middle, digits)
     what = f"{changes_text(study, row)}: {name} "
     if not study.pairs[row, objective]:
         return f"{what}cannot be compared, no test frame is shared with the base"
     if np.isnan(study.change_low[row, objective]):
         return f"{what}{change} {word}, too few frames for an interval"
-    said = f"{change} {word} (95 % interval {low} to {high})"
+    low, high = study.change_low[row, objective], study.change_high[row, objective]
+    half = f"{max(middle - low, high - middle):.{digits}f}"
     if study.significant[row, objective]:
-        return what + said
-    return f"{what}not distinguishable, {said}"
+        return f"{what}{change} ± {half} {word}"
+    return f"{what}{change} {word}, not distinguishable from {half} of noise"
 
 
 def _signed(value: float, digits: int) -> str:

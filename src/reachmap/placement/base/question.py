@@ -18,6 +18,7 @@ from reachmap.placement.mapped.exact import ALWAYS, NEVER, PlacedScene, Pose, Po
 from reachmap.placement.mapped.imaging import imaging_configurations
 from reachmap.placement.mapped.sample import THIN, Grid, sample_of
 from reachmap.placement.predicted.region import Region
+from reachmap.scans.cycle.places import drop_off_poses
 
 if TYPE_CHECKING:
     from reachmap.cell.loading import LoadedCell
@@ -70,8 +71,25 @@ class BaseQuestion:
         return f"{outside} is outside the region" if outside else self.contact(pose)
 
     def contact(self, pose: Pose) -> str:
-        """What the base would collide with, or ""."""
-        return "" if self.fit is None else self.fit.reason_against(pose)
+        """What the base would collide with, or that no drop-off is in reach, or ""."""
+        met = "" if self.fit is None else self.fit.reason_against(pose)
+        return met or self._without_drop_off(pose)
+
+    def _without_drop_off(self, pose: Pose) -> str:
+        """Say that no drop-off has a configuration that is free of collision, or "".
+
+        One is enough. Those given by joint values go with the arm.
+        """
+        specs = self.loaded.cell.drop_offs
+        if not specs or any(spec.pose is None for spec in specs):
+            return ""
+        scene = self.scene_at(pose)
+        for spec in specs:
+            T = drop_off_poses(scene.loaded.cell, spec)
+            Q, _ = scene.kinematics.solve_many(T, windings=False)
+            if any(scene.checker.is_free(q) for q in Q):
+                return ""
+        return "no drop-off can be reached"
 
     def can_be_imaged(self, pose: Pose) -> bool:
         """Whether some scan configuration images the bin; asked where it is chosen."""
