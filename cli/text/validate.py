@@ -44,6 +44,7 @@ def validation_text(validation: Validation) -> str:
             "(means over those reached)",
             *_group_lines(validation.groups),
             _cheaper_line(validation),
+            *_cycle_lines(validation),
         ]
     )
 
@@ -160,6 +161,38 @@ def _figures_row(figures: OrderFigures) -> list[str]:
         _number(figures.execution_time, 2),
         _number(figures.calls_first, 2),
         _number(figures.calls_top, 2),
+    ]
+
+
+def _cycle_lines(validation: Validation) -> list[str]:
+    """Whole cycles planned anew beside those of the map."""
+    if not validation.cycles:
+        return []
+    overall = validation.cycles[-1]
+    c, r = overall.confusion, overall.correlation
+    rows = [["", "order", "whole", "cycle [s]"]]
+    for one in validation.cycles:
+        label = printable(one.label, LABEL_WIDTH)
+        for name, first in one.orders.items():
+            share = f"{first.whole}/{first.considered}"
+            rows.append([label, name, share, _number(first.seconds, 2)])
+            label = ""
+    return [
+        "",
+        "Whole cycles planned anew, with the part",
+        *fact_lines(
+            [
+                ("precision", _share_text(c.precision)),
+                ("recall", _share_text(c.recall)),
+                (
+                    "order of seconds",
+                    f"Spearman {_signed(r.spearman)}, Kendall {_signed(r.kendall)} "
+                    f"over {plural(r.count, 'grasp')}",
+                ),
+            ]
+        ),
+        f"First {validation.top} of each order, mean measured cycle of those whole",
+        *table_lines(rows, "<<>>"),
     ]
 
 

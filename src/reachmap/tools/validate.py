@@ -23,6 +23,7 @@ from reachmap.ranking.lists.reading import STDIN
 from reachmap.ranking.lookup.calibration import calibration_beside
 from reachmap.ranking.lookup.ranker import Ranker
 from reachmap.ranking.lookup.settings import CostBasis, RankSettings
+from reachmap.ranking.terms.columns import cycle_of
 from reachmap.runtime.options import IN_PROCESS, RunOptions
 from reachmap.runtime.progress import Progress
 from reachmap.sampling.frames import approach_distance_m
@@ -30,10 +31,12 @@ from reachmap.scans.bin_scan import pairs_of_fillings
 from reachmap.tools.prologue import refuse_cell_files
 from reachmap.tools.rank import ListFormat, ranker_of, read_list
 from reachmap.validation.calibration import calibrate as fit_calibration
+from reachmap.validation.cycle_planning import plan_cycles
+from reachmap.validation.cycles import judge_cycles, settings_in_j
 from reachmap.validation.facts import facts_of
 from reachmap.validation.judgement import judge_list
 from reachmap.validation.picks import NO_PICKS, join_picks, picks_of
-from reachmap.validation.planning import PickContext, PickResults, plan_picks
+from reachmap.validation.planning import PickContext, plan_picks
 from reachmap.validation.random_grasps import random_grasps
 from reachmap.validation.routes import plan_picks_over_routes
 from reachmap.validation.summary import Validation, summarise
@@ -127,7 +130,9 @@ def validate(
     ReachmapError
         See :mod:`reachmap.errors`.
     """
-    settings, pick = settings or RankSettings(), pick or PickOptions()
+    asked, pick = settings or RankSettings(), pick or PickOptions()
+    # Ways in are judged by J, and cycles by seconds, whatever is asked for.
+    settings = settings_in_j(asked)
     _check_request(sources, random, pick, top)
     check_picture(chart, "--chart")
     calibration = calibration_beside(map_path) if calibrate else None
@@ -139,6 +144,8 @@ def validate(
     if calibrate:
         _check_calibration(map_path, context, pick)
     ranker = ranker_of(bin_map, map_path, basis, calibrated=not calibrate)
+    if asked.cost == "cycle":
+        cycle_of(ranker.table)
     ranked = [
         _rank(source, ranker, settings, list_format or ListFormat())
         for source in sources
@@ -153,13 +160,19 @@ def validate(
     attempts = _attempts(context)
     measure = plan_picks_over_routes if attempts == "roadmap" else plan_picks
     results = measure(context, run, progress=Progress("validate", quiet=run.quiet))
+    cycles = None
+    if bin_map.cycle is not None:
+        progress = Progress("cycles", quiet=run.quiet)
+        cycles = plan_cycles(context, run, progress=progress)
+    judged = []
+    for label, one, rows in zip(_labels(ranked), ranked, _rows_of(ranked), strict=True):
+        own = judge_list(label, one, ranker, bin_map, results.take(rows))
+        if cycles is not None:
+            seen = judge_cycles(one, ranker, asked, cycles.take(rows))
+            own = replace(own, cycles=seen)
+        judged.append(own)
     validation = summarise(
-        [
-            judge_list(label, one, ranker, bin_map, part)
-            for label, one, part in zip(
-                _labels(ranked), ranked, _split(results, ranked), strict=True
-            )
-        ],
+        judged,
         top=top,
         settings={
             **_facts_of_settings(map_path, bin_map, settings, context, top),
@@ -284,12 +297,12 @@ def _labels(ranked: Sequence[RankedList]) -> list[str]:
     ]
 
 
-def _split(results: PickResults, ranked: Sequence[RankedList]) -> list[PickResults]:
-    parts, begin = [], 0
-    for one in ranked:
-        parts.append(results.take(slice(begin, begin + len(one.grasps))))
-        begin += len(one.grasps)
-    return parts
+def _rows_of(ranked: Sequence[RankedList]) -> list[slice]:
+    """Rows of each list among those of all."""
+    ends = np.cumsum([len(one.grasps) for one in ranked]).tolist()
+    return [
+        slice(end - len(o.grasps), end) for o, end in zip(ranked, ends, strict=True)
+    ]
 
 
 def _facts_of_settings(

@@ -9,6 +9,7 @@ from reachmap.maps.bytes.to_json import json_ready
 from reachmap.ranking.lookup.order import status_name
 from reachmap.ranking.lookup.table import TERMS
 from reachmap.scans.measured import MEASURED
+from reachmap.validation.cycles import CycleSummary
 from reachmap.validation.judgement import JudgedList
 from reachmap.validation.statistics import Confusion
 from reachmap.validation.summary import (
@@ -43,6 +44,11 @@ def facts_of(
             name: dataclasses.asdict(found)
             for name, found in validation.reliability.items()
         },
+        **(
+            {"cycles": [_cycle_facts(c) for c in validation.cycles]}
+            if validation.cycles
+            else {}
+        ),
         "reliability_diagram": dataclasses.asdict(validation.diagram),
     }
     if body_pairs is not None:
@@ -62,6 +68,15 @@ def _list_facts(one: ListSummary) -> dict[str, Any]:
         "recommended": dataclasses.asdict(one.recommended),
         "correlation": dataclasses.asdict(one.correlation),
         "repeatability": dataclasses.asdict(one.repeatability),
+    }
+
+
+def _cycle_facts(one: CycleSummary) -> dict[str, Any]:
+    return {
+        "list": one.label,
+        "confusion": _confusion_facts(one.confusion),
+        "correlation": dataclasses.asdict(one.correlation),
+        "orders": {name: dataclasses.asdict(of) for name, of in one.orders.items()},
     }
 
 
@@ -88,6 +103,18 @@ def _order_facts(figures: OrderFigures) -> dict[str, Any]:
     return facts
 
 
+def _cycle_of_grasp(one: JudgedList, row: int) -> dict[str, Any]:
+    if one.cycles is None:
+        return {}
+    return {
+        "cycle": {
+            "predicted_s": one.cycles.predicted_s[row],
+            "measured_s": one.cycles.measured_s[row],
+            "status": status_name(one.cycles.status[row]),
+        }
+    }
+
+
 def _grasp_facts(
     one: JudgedList, row: int, body_pairs: tuple[str, ...]
 ) -> dict[str, Any]:
@@ -107,6 +134,7 @@ def _grasp_facts(
             "terms": dict(zip(TERMS, one.terms[row], strict=True)),
             **dict(zip(MEASURED, one.measured[row], strict=True)),
         },
+        **_cycle_of_grasp(one, row),
         "attempts": results.found.shape[1],
         "successes": int(results.found[row].sum()),
         "tool_poses": int(results.poses[row]),

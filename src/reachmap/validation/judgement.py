@@ -14,6 +14,7 @@ from reachmap.ranking.answers.ranked_list import QUADRANT_ORDER, RankedList
 from reachmap.ranking.lookup.order import OUTSIDE_MAP
 from reachmap.ranking.lookup.ranker import Ranker
 from reachmap.scans.measured import MEASURED
+from reachmap.validation.cycles import JudgedCycles
 from reachmap.validation.planning import PickResults
 
 ORDERS = ("supplied", "re-ranked", "ik-only")
@@ -51,6 +52,8 @@ class JudgedList:
         Measured J of every other attempt, and of those between.
     orders : mapping of str to int array
         Rows in the order in which they would be tried, by name in ``ORDERS``.
+    cycles : JudgedCycles or None
+        Whole cycles, where the map has them.
     """
 
     label: str
@@ -66,6 +69,7 @@ class JudgedList:
     terms: FloatArray
     halves: FloatArray
     orders: Mapping[str, IntArray]
+    cycles: JudgedCycles | None = None
 
     def __post_init__(self) -> None:
         freeze(self)

@@ -12,6 +12,7 @@ from reachmap._typing import FloatArray, IntArray
 from reachmap.maps.summary.reliability import Reliability, reliability_of
 from reachmap.scans.measured import MEASURED
 from reachmap.validation.calibration import ReliabilityDiagram, reliability_diagram
+from reachmap.validation.cycles import CycleSummary, summarise_cycles
 from reachmap.validation.judgement import ORDERS, JudgedList
 from reachmap.validation.statistics import (
     Confusion,
@@ -120,6 +121,8 @@ class Validation:
         share of the variance is the grasp and not luck.
     diagram : ReliabilityDiagram
         Predicted probabilities beside the outcomes of the grasps.
+    cycles : tuple of CycleSummary
+        Of each list; with several, the last is of all together. Empty without cycles.
     """
 
     settings: Mapping[str, Any]
@@ -129,6 +132,7 @@ class Validation:
     groups: tuple[GroupSummary, ...]
     reliability: Mapping[str, Reliability]
     diagram: ReliabilityDiagram
+    cycles: tuple[CycleSummary, ...] = ()
 
     @property
     def overall(self) -> ListSummary:
@@ -155,6 +159,13 @@ def summarise(
         summaries=tuple(summaries),
         groups=tuple(groups),
         reliability=_reliability(lists),
+        cycles=summarise_cycles(
+            [one.label for one in lists],
+            [one.cycles for one in lists if one.cycles is not None],
+            top,
+        )
+        if all(one.cycles is not None for one in lists)
+        else (),
         diagram=reliability_diagram(
             np.concatenate([one.probability for one in lists]),
             np.concatenate([one.reached for one in lists]),
