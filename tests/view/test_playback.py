@@ -14,6 +14,7 @@ from reachmap.view.playback import (
     choose_paths,
     find_path,
     playback_of,
+    stage_rows,
 )
 from reachmap.view.points import shortest_paths
 from tests.support.optional import present
@@ -137,3 +138,33 @@ def test_the_best_path_is_the_one_to_watch() -> None:
     assert len(choose_paths(record)) == 4
     own = tuple(np.argwhere(~record.path_found.any(axis=-1))[0])
     assert record.paths.index[find_path(record, own)].tolist() == [*own, -1]
+
+
+def test_a_playback_runs_the_whole_cycle_where_one_is_stored(cell: SolidCell) -> None:
+    """The stages follow the grasp in order; the part hangs on the tool in between."""
+    record = bin_with_parts(toy_bin_map())
+    whole = np.argwhere(np.isfinite(present(record.cycle).cycle_time))
+    assert len(whole)
+    for place in whole[:5].tolist():
+        row = int(present(record.best).row[tuple(place)])
+        playback = playback_of(record, row, cell.robot)
+        rows = stage_rows(record, row)
+        stages = present(record.paths.stage)
+        assert stages[rows].tolist() == [1, 2]
+        assert playback.has_cycle
+        last = np.concatenate(way_points(record, rows[-1]))[-1]
+        np.testing.assert_allclose(playback.configuration[-1], last)
+        assert playback.release == len(playback.configuration) - 1
+        at_grasp = playback.configuration[playback.grasp]
+        np.testing.assert_array_equal(present(playback.part_at(0)), at_grasp)
+        held = playback.grasp + 2
+        np.testing.assert_array_equal(
+            present(playback.part_at(held)), playback.configuration[held]
+        )
+        assert (np.diff(playback.time_s) >= 0).all()
+
+
+def test_without_a_cycle_there_is_no_part(playbacks: list[Playback]) -> None:
+    """The arm goes back out, and nothing hangs on it."""
+    assert not any(playback.has_cycle for playback in playbacks)
+    assert all(playback.part_at(3) is None for playback in playbacks)

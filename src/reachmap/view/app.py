@@ -222,16 +222,19 @@ class App:
             self._stop.clear()
             self.stage.redden()
             self._put_way(playback)
+            said = (
+                "the whole cycle" if playback.has_cycle else "to the grasp and back out"
+            )
             self.words.content = _paragraph(
-                f"Path of {playback.time_s[-1]:.2f} s", "to the grasp and back out"
+                f"Path of {playback.time_s[-1]:.2f} s", said
             )
             began = time.monotonic()
-            for q, when in zip(playback.configuration, playback.time_s, strict=True):
+            for index, when in enumerate(playback.time_s):
                 if self._stop.wait(
                     max(0.0, began + float(when) / speed - time.monotonic())
                 ):
                     return
-                self.stage.take(q)
+                self.stage.take(playback.configuration[index], playback.part_at(index))
 
     def _playback(self) -> Playback | None:
         if not isinstance(self.record, BinMap):
@@ -244,7 +247,7 @@ class App:
             self._way.remove()
             self._way = None
         if playback is not None:
-            there = playback.configuration[: playback.grasp + 1]
+            there = playback.configuration[: playback.release + 1]
             tcp = np.array([self.cell.tcp_pose(q)[:3, 3] for q in there])
             self._way = self.stage.put_way(tcp, name="/way")
 

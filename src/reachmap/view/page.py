@@ -121,7 +121,7 @@ def _bin_page(
     for number, playback in enumerate(played):
         tcp = np.array([stage.cell.tcp_pose(q)[:3, 3] for q in playback.configuration])
         way = stage.put_way(
-            tcp[: playback.grasp + 1], name=f"/way_{number}", visible=False
+            tcp[: playback.release + 1], name=f"/way_{number}", visible=False
         )
         label = stage.put_label(
             f"Path {number + 1} of {len(played)}: {_path_words(playback)}",
@@ -139,20 +139,20 @@ def _bin_page(
 
 def _path_words(playback: Playback) -> str:
     layer, y, x, orientation = playback.test_grasp
+    after = "whole cycle" if playback.has_cycle else "and back out"
     return (
-        f"test grasp {layer},{y},{x},{orientation} and back out, "
-        f"{playback.time_s[-1]:.2f} s"
+        f"test grasp {layer},{y},{x},{orientation} {after}, {playback.time_s[-1]:.2f} s"
     )
 
 
 def _play(recording: Any, stage: Stage, playback: Playback) -> None:
-    stage.take(playback.configuration[0])
+    stage.take(playback.configuration[0], playback.part_at(0))
     recording.insert_sleep(PAUSE_S)
     for index in range(1, len(playback.configuration)):
-        stage.take(playback.configuration[index])
+        stage.take(playback.configuration[index], playback.part_at(index))
         step = playback.time_s[index] - playback.time_s[index - 1]
         recording.insert_sleep(float(step))
-        if index == playback.grasp:
+        if index in (playback.grasp, playback.release):
             recording.insert_sleep(PAUSE_S)
     recording.insert_sleep(PAUSE_S)
 

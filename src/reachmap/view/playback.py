@@ -20,21 +20,28 @@ from reachmap.motions.motion import trapezoid, way_points
 from reachmap.view.points import shortest_paths
 
 FRAMES_PER_S = 24.0
+HELD_STAGES = 3
+"""Stages with the part in hand: lift, transfer, place."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Playback:
-    """What the arm does from the scan configuration to a grasp and back out of it.
+    """What the arm does from the scan configuration to a grasp, and after it.
+
+    After the grasp it runs the whole cycle where one is stored, else it goes back out.
 
     Attributes
     ----------
     configuration : array, shape (k, dof)
         [rad].
     time_s : array, shape (k,)
-        When each is taken, from 0; that of the grasp is the execution time, the
-        last is later by the retreat, which goes back by the same way.
+        When each is taken, from 0; that of the grasp is the execution time. After it
+        come the stages of the cycle, waits left out, or the same straight way back.
     grasp : int
         Index of the configuration at the grasp.
+    release : int
+        Index of the configuration at which the part is let go; that of the grasp
+        where no cycle is played.
     test_grasp : tuple of int
         layer, y, x, orientation.
     """
@@ -42,7 +49,23 @@ class Playback:
     configuration: FloatArray
     time_s: FloatArray
     grasp: int
+    release: int
     test_grasp: tuple[int, int, int, int]
+
+    @property
+    def has_cycle(self) -> bool:
+        """Whether the whole cycle is played."""
+        return self.release > self.grasp
+
+    def part_at(self, index: int) -> FloatArray | None:
+        """Configuration (dof,) whose tool tells where the part is; None without one.
+
+        It lies at the grasp, hangs on the tool, lies where it was let go.
+        """
+        if not self.has_cycle:
+            return None
+        held: FloatArray = self.configuration[min(max(index, self.grasp), self.release)]
+        return held
 
 
 def playback_of(record: BinMap, row: int, robot: RobotModel) -> Playback:
@@ -56,26 +79,56 @@ def playback_of(record: BinMap, row: int, robot: RobotModel) -> Playback:
     robot : RobotModel
         Gives the limits.
     """
-    limits = robot.velocity_rad_s, robot.acceleration_rad_s2
     planned, approach = way_points(record, row)
-    corners = merge_straight(planned) if len(planned) > 1 else planned
-    times = segment_times_s(corners, *limits) if len(corners) > 1 else np.zeros(0)
-    way_s = smooth_way_time_s(approach, *limits)
-    parts = [
-        _eased(np.stack([a, b]), float(time), *limits)
-        for a, b, time in zip(corners[:-1], corners[1:], times, strict=True)
-    ]
-    if len(approach) > 1:
-        down, when = _eased(approach, way_s, *limits)
-        parts += [(down, when), (down[::-1], when)]
+    parts = _pieces(planned, approach, robot)
+    at_grasp, at_release = len(parts), len(parts)
+    stages = stage_rows(record, row)
+    for number, stage in enumerate(stages):
+        parts += _pieces(*way_points(record, stage), robot)
+        # The tool goes away empty after the third stage: lift, transfer, place.
+        at_release = len(parts) if number < HELD_STAGES else at_release
+    if not stages and len(approach) > 1:
+        down, when = parts[-1]
+        parts.append((down[::-1], when))
     configuration, time_s, starts = _joined(planned[:1], parts)
+    starts.append(len(configuration) - 1)
     index = record.paths.index[row]
     return Playback(
         configuration=configuration,
         time_s=time_s,
-        grasp=starts[-1] if len(approach) > 1 else len(configuration) - 1,
+        grasp=starts[at_grasp],
+        release=starts[at_release],
         test_grasp=(int(index[0]), int(index[1]), int(index[2]), int(index[3])),
     )
+
+
+def stage_rows(record: BinMap, row: int) -> list[int]:
+    """Rows of the paths that follow a path to a grasp, in order; none without cycle."""
+    paths = record.paths
+    if paths.stage is None or record.best is None:
+        return []
+    place = tuple(paths.index[row, :4].tolist())
+    if record.best.row[place] != row:
+        return []
+    own = (paths.index[:, :4] == paths.index[row, :4]).all(axis=1) & (paths.stage > 0)
+    rows = np.flatnonzero(own)
+    return [int(k) for k in rows[np.argsort(paths.stage[rows], kind="stable")]]
+
+
+def _pieces(
+    planned: FloatArray, way: FloatArray, robot: RobotModel
+) -> list[tuple[FloatArray, FloatArray]]:
+    """Motions from rest to rest of a planned path and a straight way after it."""
+    limits = robot.velocity_rad_s, robot.acceleration_rad_s2
+    corners = merge_straight(planned) if len(planned) > 1 else planned
+    times = segment_times_s(corners, *limits) if len(corners) > 1 else np.zeros(0)
+    parts = [
+        _eased(np.stack([a, b]), float(time), *limits)
+        for a, b, time in zip(corners[:-1], corners[1:], times, strict=True)
+    ]
+    if len(way) > 1:
+        parts.append(_eased(way, smooth_way_time_s(way, *limits), *limits))
+    return parts
 
 
 def _joined(
@@ -118,6 +171,7 @@ def choose_paths(record: BinMap) -> tuple[int, ...]:
     """Rows of paths worth watching: a typical one in each quadrant of the bin.
 
     Typical is the median of the lengths; the shortest paths all lead to the middle.
+    Where there are whole cycles, one of them.
     """
     rows = shortest_paths(record)
     length = np.full(rows.shape, np.inf)
@@ -126,6 +180,8 @@ def choose_paths(record: BinMap) -> tuple[int, ...]:
         length[has] = record.best.path_length[has]
     else:
         length[has] = record.path_length[tuple(record.paths.index[rows[has]].T)]
+    if record.cycle is not None and np.isfinite(record.cycle.cycle_time).any():
+        length[np.isnan(record.cycle.cycle_time)] = np.inf
     chosen = []
     for north in (True, False):
         for east in (False, True):

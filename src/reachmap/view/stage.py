@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from reachmap._typing import CodeArray, FloatArray, IntArray
+from reachmap.cell.model.shapes import triangles_of
+from reachmap.core.collision.held_part import HeldPart
 from reachmap.core.collision.solids import Solid, SolidCell
 from reachmap.geometry import quaternion_wxyz_from_rotation
 from reachmap.plots.cell.cell_colours import BIN, BLOCKING, solid_colours
@@ -21,6 +23,7 @@ CREASE_RAD = 0.6
 # Walls and floors that would hide the arm are seen through.
 LARGE_BODY_M = 1.5
 GLASS = 0.16
+PART = (214, 138, 60)
 
 
 def percent_colours(percent: FloatArray) -> CodeArray:
@@ -57,20 +60,52 @@ class Stage:
             (solid.name, self._add_solid(index, solid))
             for index, solid in enumerate(cell.solids)
         ]
+        self._part = HeldPart.of(cell.loaded)
+        self._part_mesh: Any = None
         self._red: frozenset[str] = frozenset()
         self._last = np.full((len(self._joints), 4, 4), np.nan)
         self._add_camera()
         self.take(cell.scan_configuration)
         self._place_viewer(server)
 
-    def take(self, q: FloatArray) -> None:
-        """Put the arm into a configuration (dof,) [rad]."""
+    def take(self, q: FloatArray, part_at: FloatArray | None = None) -> None:
+        """Put the arm into a configuration (dof,) [rad].
+
+        Parameters
+        ----------
+        q : array, shape (dof,)
+        part_at : array, shape (dof,), optional
+            Configuration whose tool tells where the part is; without one it is hidden.
+        """
+        self._put_part(part_at)
         poses = self.cell.joint_poses(q)
         for handle, T, before in zip(self._joints, poses, self._last, strict=True):
             if not np.allclose(T, before, atol=1e-7, equal_nan=False):
                 handle.position = T[:3, 3]
                 handle.wxyz = quaternion_wxyz_from_rotation(T[:3, :3])
         self._last = poses
+
+    def _put_part(self, q: FloatArray | None) -> None:
+        """Show the part where the tool of a configuration holds it, or hide it."""
+        part = self._part
+        if part is None or (q is None and self._part_mesh is None):
+            return
+        if self._part_mesh is None:
+            surface = triangles_of(part.solid)
+            solid = Solid(
+                name="part",
+                kind="body",
+                joint=0,
+                T_joint_solid=np.eye(4),
+                vertices=surface.vertices,
+                triangles=surface.triangles,
+            )
+            self._part_mesh = self._mesh("/part", solid, np.eye(4), PART, opacity=None)
+        self._part_mesh.visible = q is not None
+        if q is not None:
+            T = self.cell.tcp_pose(q) @ part.T_tcp_part
+            self._part_mesh.position = T[:3, 3]
+            self._part_mesh.wxyz = quaternion_wxyz_from_rotation(T[:3, :3])
 
     def redden(self, names: Iterable[str] = ()) -> None:
         """Show some bodies in red, by name, and all others as they are."""
