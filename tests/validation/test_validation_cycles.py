@@ -13,8 +13,8 @@ from reachmap.errors import SettingsError
 from reachmap.maps import read_bin_map
 from reachmap.maps.parts import StageStatus
 from reachmap.ranking import RankSettings
+from reachmap.runtime.options import RunOptions
 from reachmap.tools.bin_scan import bin_scan
-from reachmap.tools.options import RunOptions
 from reachmap.tools.validate import PickOptions, validate
 from tests.scans.test_cycle_toy import HALF, MARGIN, TOY
 

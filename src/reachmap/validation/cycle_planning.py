@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from reachmap._typing import CodeArray, FloatArray
-from reachmap.maps.records import freeze
+from reachmap.maps.parts import freeze
 from reachmap.runtime.job import Job
 from reachmap.runtime.options import RunOptions
 from reachmap.runtime.progress import Progress

@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from reachmap._typing import BoolArray, CodeArray, FloatArray, IntArray
-from reachmap.maps.records import freeze
+from reachmap.maps.parts import freeze
 from reachmap.ranking.answers.ranked_list import RankedList
 from reachmap.ranking.lookup.order import OUTSIDE_MAP
 from reachmap.ranking.lookup.ranker import Ranker
