@@ -30,6 +30,11 @@ OBJECTIVES = (
     "directions",
     "points",
     "path_length_rad",
+    "motion_time_s",
+    "robust_reachability",
+    "emptied",
+    "cycle_reachability",
+    "cycle_time_s",
 )
 
 
@@ -69,7 +74,7 @@ OBJECTIVES = (
     type=click.Choice(OBJECTIVES),
     multiple=True,
     help="What variants are judged by; the first says which is best. Repeatable; by "
-    "default all.",
+    "default the first five.",
 )
 @click.option(
     "--require",

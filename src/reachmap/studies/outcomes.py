@@ -23,11 +23,17 @@ from reachmap.maps.comparison.significance import (
     paired_means,
 )
 from reachmap.maps.records import BinMap, Status, WorkspaceMap
-from reachmap.maps.study.record import PATH_LENGTH
-from reachmap.maps.summary.directions import approach_direction
+from reachmap.maps.study.record import MEANS, PATH_LENGTH
+from reachmap.maps.summary.directions import (
+    approach_direction,
+    reachability_of_directions,
+)
+from reachmap.maps.summary.emptying import volume_left
 from reachmap.maps.summary.statistics import best_level, level_means, wilson_interval
 
 NAN: Final = float("nan")
+# What a bin that was put down by hand, or a camera, is off by at most.
+ROBUST_M: Final = 0.010
 SMALL_TURN: Final = float(np.radians(TOLERANCE_DEG))
 
 
@@ -89,18 +95,56 @@ def of_workspace(record: WorkspaceMap) -> dict[str, Outcomes]:
 
 
 def of_bin(record: BinMap) -> dict[str, Outcomes]:
-    """Reachability of frames, directions and points, and the mean path length."""
+    """What a bin map says of frames, directions, points, paths and cycles."""
     table = frame_table(record, "bin")
     hit = table.status == Status.PATH_FOUND
     place = table.position / TOLERANCE_M
     axis = _directions(table, record.approach_axis) / SMALL_TURN
-    lengths = _path_lengths(record, table)
-    return {
-        "bin_reachability": _share(np.column_stack([place, _turns(table)]), hit),
+    frame = np.column_stack([place, _turns(table)])
+    found = {
+        "bin_reachability": _share(frame, hit),
         "directions": _share(*_any(np.column_stack([place, axis]), hit)),
         "points": _share(*_any(place, hit)),
-        PATH_LENGTH: _mean(np.column_stack([place, _turns(table)]), lengths),
+        PATH_LENGTH: _mean(frame, table.path_length),
     }
+    return found | _of_best_paths(record, table, frame) | _emptied(record)
+
+
+def _of_best_paths(
+    record: BinMap, table: FrameTable, frame: FloatArray
+) -> dict[str, Outcomes]:
+    """Lengths, times and clearances of best paths, and whole cycles."""
+    status = record.status.ravel()
+    known = ~np.isin(status, [Status.NOT_ATTEMPTED, Status.ERROR])
+    hit = status == Status.PATH_FOUND
+    # The order in which frame_table lists them.
+    order = np.flatnonzero(known)[np.argsort(~hit[known], kind="stable")]
+    if len(order) != len(table):  # a pose that occurs twice is listed once
+        return {}
+    found = {}
+    if record.best is not None:
+        length, time_s = record.best.path_length, record.best.execution_time
+        found[PATH_LENGTH] = _mean(frame, length.ravel()[order])
+        found["motion_time_s"] = _mean(frame, time_s.ravel()[order])
+    if record.margins is not None:
+        kept = hit & (record.margins.clearance.ravel() >= ROBUST_M)
+        found["robust_reachability"] = _share(frame, kept[order])
+    if record.cycle is not None:
+        cycle_s = record.cycle.cycle_time.ravel()[order]
+        found["cycle_reachability"] = _share(frame, ~np.isnan(cycle_s))
+        found["cycle_time_s"] = _mean(frame, cycle_s)
+    return found
+
+
+def _emptied(record: BinMap) -> dict[str, Outcomes]:
+    """Share of a full column of parts that can be picked, point by point [percent]."""
+    _, points = reachability_of_directions(record)
+    if len(record.layer) < 2 or np.isnan(points).any():
+        return {}
+    left = volume_left(points == 0, record.layer, float(record.bin_inner[2]))
+    y, x = np.meshgrid(record.y, record.x, indexing="ij")
+    place = np.column_stack([x.ravel(), y.ravel()]) / TOLERANCE_M
+    return {"emptied": _mean(place, 100.0 * (1.0 - left.ravel()))}
 
 
 def _turns(table: FrameTable) -> FloatArray:
@@ -110,18 +154,6 @@ def _turns(table: FrameTable) -> FloatArray:
 def _directions(table: FrameTable, approach_axis: str) -> FloatArray:
     identity = np.array([1.0, 0.0, 0.0, 0.0])
     return np.asarray(table.rotation @ approach_direction(identity, approach_axis))
-
-
-def _path_lengths(record: BinMap, table: FrameTable) -> FloatArray:
-    """Of the best path of each frame [rad]; the mean of attempts in old maps."""
-    if record.best is None:
-        return table.path_length
-    known = ~np.isin(record.status.ravel(), [Status.NOT_ATTEMPTED, Status.ERROR])
-    reached = record.status.ravel() == Status.PATH_FOUND
-    # The order in which frame_table lists them; a bin has no pose twice.
-    order = np.flatnonzero(known)[np.argsort(~reached[known], kind="stable")]
-    lengths = record.best.path_length.ravel()[order]
-    return lengths if len(lengths) == len(table) else table.path_length
 
 
 def _any(key: FloatArray, hit: BoolArray) -> tuple[FloatArray, BoolArray]:
@@ -168,7 +200,7 @@ def compare_outcomes(name: str, before: Outcomes, after: Outcomes) -> Change:
     """Compare two variants on what both have an outcome of."""
     in_a, in_b = _matches(before.key, after.key)
     a, b = before.result[in_a], after.result[in_b]
-    if name == PATH_LENGTH:
+    if name in MEANS:
         both = ~np.isnan(a) & ~np.isnan(b)
         if not both.any():
             return Change()

@@ -13,7 +13,7 @@ from typing import Any
 from reachmap.cell.loading import LoadedCell, read_cell
 from reachmap.errors import CellError, GateFailedError, SettingsError
 from reachmap.maps import Stamp, collect_provenance, config_sha256
-from reachmap.maps.study.record import OBJECTIVES, Study
+from reachmap.maps.study.record import ALWAYS, OBJECTIVES, Study
 from reachmap.runtime.job import Job, Stages, Work
 from reachmap.runtime.options import IN_PROCESS, RunOptions
 from reachmap.runtime.run import run_scan
@@ -83,7 +83,8 @@ def study(
     place : bool
         Place the bin again in each variant.
     objectives : sequence of str
-        Keys of :data:`~reachmap.maps.study.record.OBJECTIVES`, all by default; the
+        Keys of :data:`~reachmap.maps.study.record.OBJECTIVES`; by default those that
+        every cell has; the
         first says which variant is best.
     require : sequence of str
         As in ``"bin_reachability >= 90"``.
@@ -108,6 +109,7 @@ def study(
     overrides = with_seed(overrides, seed)
     base = read_cell(cell, overrides)
     refuse_cell_files([output], base)
+    _check_objectives(names, base)
     if samples is not None and optimise is not None:
         raise SettingsError("give --optimise or --latin-hypercube, not both")
     factors = factors_of(
@@ -195,6 +197,17 @@ def _requirement(text: str) -> Requirement:
     return Requirement(objective=found[1], operator=found[2], bound=float(found[3]))
 
 
+def _check_objectives(names: Sequence[str], base: LoadedCell) -> None:
+    """Refuse objectives that a cell's maps do not have."""
+    cell = base.cell
+    has_cycle = cell.held() is not None and bool(cell.drop_offs)
+    for name in names:
+        if name.startswith("cycle_") and not has_cycle:
+            raise SettingsError(f"{name}: the cell has no part, or no drop_off")
+        if name == "emptied" and len(cell.bin_scan.layers) < 2:
+            raise SettingsError("emptied: bin_scan needs layers at two heights or more")
+
+
 def _objective_names(
     objectives: Sequence[str], requirements: Sequence[Requirement]
 ) -> tuple[str, ...]:
@@ -202,7 +215,7 @@ def _objective_names(
         if name not in OBJECTIVES:
             names = ", ".join(OBJECTIVES)
             raise SettingsError(f"--objective {name!r:.60}: expected one of {names}")
-    asked = objectives or [*OBJECTIVES]
+    asked = objectives or ALWAYS
     return tuple(dict.fromkeys([*asked, *(item.objective for item in requirements)]))
 
 

@@ -13,7 +13,7 @@ from reachmap.maps.format.assembly import assemble, origin_of
 from reachmap.maps.format.checks import require
 from reachmap.maps.format.layout import Layout, Variable, index
 from reachmap.maps.format.store import RecordFile
-from reachmap.maps.study.record import PATH_LENGTH, STATES, Study, VariantStatus
+from reachmap.maps.study.record import MEANS, STATES, Study, VariantStatus
 
 TEXTS: Final = {
     "assignment": "What the variant sets.",
@@ -89,7 +89,7 @@ def check_study(tree: Tree) -> list[str]:
 
 def _check_counts(tree: Tree, change: Any) -> list[str]:
     pairs, gained, lost = (tree.array(name) for name in COUNTS)
-    share = np.array(tree.attributes["objective_names"]) != PATH_LENGTH
+    share = ~np.isin(tree.attributes["objective_names"], [*MEANS])
     counted = share[None, :] & ~np.isnan(change) & (pairs > 0)
     points = 100.0 * (gained - lost) / np.maximum(pairs, 1)
     return [

@@ -18,9 +18,24 @@ OBJECTIVES: dict[str, str] = {
     "directions": "percent",
     "points": "percent",
     PATH_LENGTH: "rad",
+    "motion_time_s": "s",
+    "robust_reachability": "percent",
+    "emptied": "percent",
+    "cycle_reachability": "percent",
+    "cycle_time_s": "s",
 }
 """Name of an objective to its unit."""
-LOWER_IS_BETTER = frozenset({PATH_LENGTH})
+ALWAYS = (
+    "level_average",
+    "bin_reachability",
+    "directions",
+    "points",
+    PATH_LENGTH,
+)
+"""Objectives that every cell has."""
+MEANS = frozenset({PATH_LENGTH, "motion_time_s", "emptied", "cycle_time_s"})
+"""Objectives that are means of numbers; the others are shares of what is reached."""
+LOWER_IS_BETTER = frozenset({PATH_LENGTH, "motion_time_s", "cycle_time_s"})
 
 
 class VariantStatus(IntEnum):

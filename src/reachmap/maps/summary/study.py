@@ -10,8 +10,8 @@ import numpy as np
 from reachmap._typing import FloatArray
 from reachmap.maps.study.record import OBJECTIVES, STATES, Study
 
-UNIT_WORDS = {"percent": "%", "rad": "rad"}
-CHANGE_WORDS = {"percent": "points", "rad": "rad"}
+UNIT_WORDS = {"percent": "%", "rad": "rad", "s": "s"}
+CHANGE_WORDS = {"percent": "points", "rad": "rad", "s": "s"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
