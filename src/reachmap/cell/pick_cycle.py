@@ -57,14 +57,17 @@ def check_cycle_names(document: Document, robot: UrdfDescription) -> None:
         for body in entries(data, "bodies")
         if (name := text_at(body, "name"))
     }
+    others = at(data, "bins")
     still = [*STILL, "bin", *(n for n, parent in bodies.items() if parent in STILL)]
+    still += [n for n in [text_at(data, "bin", "name")] if n]
+    still += list(others) if isinstance(others, dict) else []
     for place in drop_off_places(data):
         frame = text_at(data, *place, "frame")
         if frame is not None and frame not in still:
             hint = did_you_mean(frame, still)
             document.add(
                 (*place, "frame"),
-                f"{frame!r} is neither world, robot_base, bin nor a body that stands "
+                f"{frame!r} is neither world, robot_base, a bin nor a body that stands "
                 f"still; {hint}",
             )
     known = [*robot.links, *bodies, "bin", *(at(data, "bins") or {})]

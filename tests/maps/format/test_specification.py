@@ -142,10 +142,13 @@ def test_the_page_has_nothing_that_no_file_has() -> None:
 
 
 def test_the_states_are_listed() -> None:
-    """Each code with its CF meaning, in order."""
-    table = re.findall(r"^\| (\d) \| `(\w+)` \|", PAGE.read_text(), flags=re.MULTILINE)
+    """Each code with its CF meaning, in order: of frames, and of stages."""
+    table = re.findall(r"^\| (\d+) \| `(\w+)` \|", PAGE.read_text(), flags=re.MULTILINE)
     from reachmap.maps import Status
+    from reachmap.maps.parts import StageStatus
 
     assert [(int(code), name) for code, name in table] == [
-        (int(status), status.name.lower()) for status in Status
+        (int(code), code.name.lower())
+        for codes in (Status, StageStatus)
+        for code in codes
     ]

@@ -128,8 +128,8 @@ class DropOffSpec(JointValues):
     name: Identifier = Field("drop-off", description="Name in maps and messages.")
     frame: Name = Field(
         "world",
-        description="Frame of pose: world, robot_base, bin, or a body that stands "
-        "still.",
+        description="Frame of pose: world, robot_base, bin, another bin by name, or a "
+        "body that stands still.",
     )
     pose: PoseSpec | None = Field(
         None, description="TCP when the part is released, in that frame."

@@ -137,8 +137,10 @@ def drop_off_poses(cell: Cell, spec: DropOffSpec) -> FloatArray:
 
 def _frame(cell: Cell, name: str) -> FloatArray:
     """Frame of a drop-off in robot_base, (4, 4)."""
-    if name == "bin":
+    if name in ("bin", cell.bin.name):
         return cell.T_base_bin()
+    if name in cell.bins:
+        return cell.T_base_of(cell.bins[name])
     frames = {"world": cell.T_base_world(), "robot_base": np.eye(4)}
     if name in frames:
         return frames[name]
