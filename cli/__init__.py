@@ -7,9 +7,9 @@ from typing import NoReturn
 
 import click
 
-from reachmap import __version__
 from reachmap.cli.group import PipelineGroup
 from reachmap.cli.streams import prepare_streams
+from reachmap.cli.verbosity import show_version
 
 __all__ = ["group", "main"]
 
@@ -23,7 +23,14 @@ __all__ = ["group", "main"]
         "max_content_width": 88,
     },
 )
-@click.version_option(__version__, prog_name="reachmap", message="%(prog)s %(version)s")
+@click.option(
+    "--version",
+    is_flag=True,
+    expose_value=False,
+    is_eager=True,
+    callback=show_version,
+    help="Show the version and exit; with -v those of the engines, too.",
+)
 def group() -> None:
     """Path-reachability maps for bin-picking cells.
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import json
 import logging
 from pathlib import Path
 
 import click
 
+from reachmap.cli.answers import say
+from reachmap.cli.completing import DEFAULT_CELL
 from reachmap.cli.options import (
-    DEFAULT_CELL,
     INPUT_FILE,
     bin_option,
     cell_option,
@@ -105,7 +105,7 @@ def command(
             run=run,
         )
         facts = {"output": str(written_by(output, run))} | summary_of_bin(result)
-    click.echo(json.dumps(facts) if as_json else facts_text(facts))
+    say(facts, lambda: facts_text(facts), as_json=as_json)
 
 
 def _found_here() -> tuple[Path | None, Path | None]:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-import json
+from collections.abc import Iterator, Sequence
+from typing import Any
 
 import click
 
+from reachmap.cli.answers import say
 from reachmap.cli.options import json_option
 
 
@@ -26,10 +28,10 @@ def command(as_json: bool) -> None:
     from reachmap.tools.carriers import list_carriers
 
     rows = list_carriers()
-    if as_json:
-        click.echo(json.dumps({"carriers": rows}))
-        return
+    say({"carriers": rows}, lambda: "\n".join(_lines(rows)), as_json=as_json)
 
+
+def _lines(rows: Sequence[dict[str, Any]]) -> Iterator[str]:
     def size(values: tuple[float, ...]) -> str:
         return " x ".join(f"{value:g}" for value in values)
 
@@ -41,4 +43,4 @@ def command(as_json: bool) -> None:
     widths = [max(map(len, column)) for column in list(zip(*table, strict=True))[:3]]
     for *cells, what in table:
         padded = (cell.ljust(width) for cell, width in zip(cells, widths, strict=True))
-        click.echo("  ".join([*padded, what]))
+        yield "  ".join([*padded, what])

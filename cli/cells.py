@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import json
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import click
 
+from reachmap.cli.answers import say
+from reachmap.cli.completing import complete_cells
 from reachmap.cli.options import (
-    INPUT_FILE,
     json_option,
     output_option,
     overwrite_option,
@@ -19,50 +20,54 @@ from reachmap.cli.options import (
 @click.command()
 @click.option(
     "--export",
-    "artefact",
-    type=INPUT_FILE,
-    metavar="FILE",
-    help="Write the cell that this artefact was made from as YAML.",
+    "source",
+    metavar="NAME|FILE",
+    shell_complete=complete_cells,
+    help="Write a shipped cell, or the cell that an artefact was made from, as YAML.",
 )
 @output_option(help="Where --export writes; by default standard output.")
 @overwrite_option
 @json_option
 def command(
-    artefact: Path | None, output: Path | None, overwrite: bool, as_json: bool
+    source: str | None, output: Path | None, overwrite: bool, as_json: bool
 ) -> None:
     """List the shipped cells, or export one.
 
     Without options: name, robot and description of each shipped cell. The name is
     enough wherever a command takes a cell.
 
-    With --export: the cell that an artefact was made from, with overrides, chosen bin
-    pose and chosen scan configuration.
+    With --export: a shipped cell as it stands, its comments included, or the cell that
+    an artefact was made from, with overrides, chosen bin pose and chosen scan
+    configuration.
 
-    Example: reachmap cells --export placement.h5 -o cell.yaml
+    \b
+    Example:
+      reachmap cells --export ur5-eye-in-hand -o my-cell.yaml
+      reachmap cells --export placement.h5 -o cell.yaml
     """
     from reachmap.tools.cells import export_cell, list_cells
 
-    if artefact is None:
+    if source is None:
         unused("output", "overwrite", because="needs --export")
         rows = [
             {"name": row.name, "robot": row.robot, "description": row.description}
             for row in list_cells()
         ]
-        if as_json:
-            click.echo(json.dumps({"cells": rows}))
-            return
-        widths = [max(len(row[key]) for row in rows) for key in ("name", "robot")]
-        for row in rows:
-            name, robot = row["name"].ljust(widths[0]), row["robot"].ljust(widths[1])
-            click.echo(f"{name}  {robot}  {row['description']}")
+        say({"cells": rows}, lambda: "\n".join(_lines(rows)), as_json=as_json)
         return
     if output is None:
         unused("overwrite", because="needs --output")
-    text = export_cell(artefact, output=output, overwrite=overwrite)
-    if as_json:
-        target = None if output is None else str(output)
-        click.echo(json.dumps({"output": target, "cell_yaml": text}))
-    elif output is None:
-        click.echo(text, nl=False)
-    else:
-        click.echo(f"{output}: cell of {artefact}")
+    text = export_cell(source, output=output, overwrite=overwrite)
+    target = None if output is None else str(output)
+    say(
+        {"output": target, "cell_yaml": text},
+        lambda: text if output is None else f"{output}: cell of {source}",
+        as_json=as_json,
+    )
+
+
+def _lines(rows: Sequence[dict[str, str]]) -> Iterator[str]:
+    widths = [max(len(row[key]) for row in rows) for key in ("name", "robot")]
+    for row in rows:
+        name, robot = row["name"].ljust(widths[0]), row["robot"].ljust(widths[1])
+        yield f"{name}  {robot}  {row['description']}"

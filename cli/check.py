@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import click
 
+from reachmap.cli.answers import say
 from reachmap.cli.failures import RunState
 from reachmap.cli.options import cell_argument, json_option, set_option
 
@@ -36,12 +36,13 @@ def command(
     from reachmap.tools.check import check
 
     answer = check(cell, overrides)
-    if as_json:
-        click.echo(json.dumps(dataclasses.asdict(answer)))
-    else:
-        state = ctx.find_object(RunState)
-        for line in _lines(answer, verbose=state is not None and state.verbosity > 0):
-            click.echo(line)
+    state = ctx.find_object(RunState)
+    verbose = state is not None and state.verbosity > 0
+    say(
+        dataclasses.asdict(answer),
+        lambda: "\n".join(_lines(answer, verbose=verbose)),
+        as_json=as_json,
+    )
     if answer.problems:
         raise SceneError(f"{answer.source}: {line}" for line in answer.problems)
 

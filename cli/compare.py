@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Literal
 
 import click
 
+from reachmap.cli.answers import say
 from reachmap.cli.options import (
     INPUT_FILE,
     OUTPUT_PATH,
@@ -91,9 +91,10 @@ def command(
         draw_many(found, picture, overwrite=overwrite)
     elif picture is not None:
         draw(one, picture, overwrite=overwrite)
-    if as_json:
-        click.echo(json.dumps(found.facts() if others else one.facts()))
-    else:
-        click.echo(compare_many_text(found) if others else compare_text(one))
+    say(
+        found.facts() if others else one.facts(),
+        lambda: compare_many_text(found) if others else compare_text(one),
+        as_json=as_json,
+    )
     if fail_under is not None:
         found.require(fail_under)

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Literal
 
 import click
 
+from reachmap.cli.answers import say
 from reachmap.cli.options import (
     INPUT_FILE,
     json_option,
@@ -85,8 +85,9 @@ def command(
         output=output,
         overwrite=overwrite,
     )
-    if as_json:
-        click.echo(json.dumps(answer.facts()))
-    else:
-        written = [] if output is None else [str(output)]
-        click.echo("\n".join([*emptying_lines(answer), *written]))
+    written = [] if output is None else [str(output)]
+    say(
+        answer.facts(),
+        lambda: "\n".join([*emptying_lines(answer), *written]),
+        as_json=as_json,
+    )

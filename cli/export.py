@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from reachmap.cli import options
+from reachmap.cli.answers import say
 
 FORMATS = ("csv", "json", "joint-trajectory", "moveit", "urscript", "krl", "rapid")
 
@@ -32,6 +33,7 @@ FORMATS = ("csv", "json", "joint-trajectory", "moveit", "urscript", "krl", "rapi
 )
 @options.output_option(help="File to write; without it, and with -, it is printed.")
 @options.overwrite_option
+@options.json_option
 def command(
     map_path: Path,
     grasps: tuple[str, ...],
@@ -39,6 +41,7 @@ def command(
     to: str,
     output: Path | None,
     overwrite: bool,
+    as_json: bool,
 ) -> None:
     """Write verified motions of a bin map for controllers.
 
@@ -63,4 +66,6 @@ def command(
         output=None if to_stdout else output,
         overwrite=overwrite,
     )
-    click.echo(exported.text if to_stdout else output, nl=not to_stdout)
+    facts = {"format": to, "motions": len(exported.motions)}
+    facts |= {"text": exported.text} if to_stdout else {"output": str(output)}
+    say(facts, lambda: exported.text if to_stdout else str(output), as_json=as_json)

@@ -24,7 +24,7 @@ from typing import Any
 import click
 
 from reachmap.cli.streams import AnswerError, discard_stdout
-from reachmap.errors import OutputError, ReachmapError
+from reachmap.errors import MissingExtraError, OutputError, ReachmapError
 
 INTERNAL_ERROR = 70
 INTERRUPTED = 130
@@ -78,6 +78,9 @@ def exit_code_of(run: Callable[[], Any], state: RunState) -> int:
         _report([f"standard output cannot be written ({error.strerror})"], state)
         return OutputError.exit_code
     except Exception as error:
+        if lines := _missing_lines(error):
+            _report(lines, state)
+            return MissingExtraError.exit_code
         _report(_internal_lines(error, state), state)
         return INTERNAL_ERROR
     return result if isinstance(result, int) else 0
@@ -88,6 +91,17 @@ def _report(lines: Iterable[str], state: RunState) -> None:
         traceback.print_exc()
     for line in lines:
         click.echo(f"reachmap: {line}", err=True)
+
+
+def _missing_lines(error: Exception) -> list[str]:
+    """What to say where a dependency is missing, as after an install for ranking."""
+    name = error.name if isinstance(error, ModuleNotFoundError) else None
+    if name is None or name.partition(".")[0] == "reachmap":
+        return []
+    return [
+        f"this needs {name}, which is not installed; the ranking-only installation "
+        "leaves it out: install reachmap-cells with its dependencies"
+    ]
 
 
 def _internal_lines(error: Exception, state: RunState) -> list[str]:

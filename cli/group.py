@@ -16,7 +16,11 @@ import click
 from click.shell_completion import CompletionItem
 
 from reachmap.cli.failures import PipeClosedError, RunState, exit_code_of
-from reachmap.cli.verbosity import configure_logging, verbosity_parameters
+from reachmap.cli.verbosity import (
+    ARGUMENTS,
+    configure_logging,
+    verbosity_parameters,
+)
 from reachmap.errors import SettingsError
 
 
@@ -101,9 +105,13 @@ COMMANDS: dict[str, Entry] = {
     **_section(
         "Runs",
         {
+            "run": "Do the whole chain: scan, place the bin, scan it, rank, report.",
             "verify": "Check a file for damage and against its contract.",
             "merge": "Join the journals of shards into one artefact.",
         },
+    ),
+    **_section(
+        "Shell", {"completion": "Print a script that teaches a shell to complete."}
     ),
 }
 
@@ -188,6 +196,11 @@ class PipelineGroup(click.Group):
             if name.startswith(incomplete)
         ]
         return names + click.Command.shell_complete(self, ctx, incomplete)
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Keep the words, in which eager options may look for others."""
+        ctx.meta[ARGUMENTS] = tuple(args)
+        return super().parse_args(ctx, args)
 
     def make_context(
         self, info_name: str | None, args: list[str], *rest: Any, **extra: Any

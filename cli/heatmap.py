@@ -8,6 +8,7 @@ from typing import Any
 import click
 
 from reachmap.cli import options
+from reachmap.cli.answers import say
 
 
 @click.command("heatmap")
@@ -55,7 +56,8 @@ from reachmap.cli import options
 )
 @options.output_option("heatmaps", help="Folder for the pictures.")
 @options.overwrite_option
-def command(artefact: Path, **settings: Any) -> None:
+@options.json_option
+def command(artefact: Path, as_json: bool, **settings: Any) -> None:
     """Draw a workspace map, one picture per level.
 
     FILE is a workspace map, workspace.h5 by default; a bin map or a placement is drawn
@@ -70,5 +72,5 @@ def command(artefact: Path, **settings: Any) -> None:
     """
     from reachmap.tools.heatmap import heatmap
 
-    for path in heatmap(artefact, **settings):
-        click.echo(path)
+    names = [str(path) for path in heatmap(artefact, **settings)]
+    say({"pictures": names}, lambda: "\n".join(names), as_json=as_json)

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import click
 
+from reachmap.cli.answers import say
 from reachmap.cli.options import INPUT_FILE, json_option
 
 
@@ -29,4 +29,4 @@ def command(artefact: Path, as_json: bool) -> None:
     from reachmap.tools.info import info
 
     found = info(artefact)
-    click.echo(json.dumps(found.facts()) if as_json else info_text(found))
+    say(found.facts(), lambda: info_text(found), as_json=as_json)

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import click
 
+from reachmap.cli.answers import say
 from reachmap.cli.options import (
     INPUT_FILE,
     json_option,
@@ -35,12 +35,9 @@ def command(
     from reachmap.tools.merge import merge
 
     outcome = merge(shards, output=output, overwrite=overwrite)
-    if as_json:
-        answer = {
-            "output": str(outcome.path),
-            "shards": len(shards),
-            "units": outcome.resumed,
-        }
-        click.echo(json.dumps(answer))
-    else:
-        click.echo(f"{outcome.path}: {outcome.resumed} units of {len(shards)} shards")
+    units = outcome.resumed
+    say(
+        {"output": str(outcome.path), "shards": len(shards), "units": units},
+        lambda: f"{outcome.path}: {units} units of {len(shards)} shards",
+        as_json=as_json,
+    )

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
-import json
+from collections.abc import Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
+from reachmap.cli.answers import say
 from reachmap.cli.options import json_option, output_option, overwrite_option
+
+if TYPE_CHECKING:
+    from reachmap.tools.new_cell import NewCell
 
 
 def _pairs(
@@ -102,8 +107,8 @@ def command(
     )
     for note in made.notes:
         click.echo(f"note: {note}", err=True)
-    if as_json:
-        answer = {
+    say(
+        {
             "output": str(made.path),
             "srdf": None if made.srdf_path is None else str(made.srdf_path),
             "base": made.base,
@@ -113,17 +118,22 @@ def command(
             "packages": dict(made.packages),
             "notes": made.notes,
             "problems": made.problems,
-        }
-        click.echo(json.dumps(answer))
-    else:
-        count = len(made.joints)
-        joints = "joint" if count == 1 else "joints"
-        click.echo(f"{made.path}: {count} {joints} from {made.base} to {made.tip}")
-        if made.srdf_path is not None:
-            click.echo(f"{made.srdf_path}: links that touch in every position")
-        done = "mend what is listed" if made.problems else "edit the lines marked GUESS"
-        click.echo(f"next: {done}, then reachmap check {made.path}")
+        },
+        lambda: "\n".join(_lines(made)),
+        as_json=as_json,
+    )
     if made.problems:
         raise SceneError(
             f"{made.path}: to be mended: {problem}" for problem in made.problems
         )
+
+
+def _lines(made: NewCell) -> Iterator[str]:
+    """What was written, and what comes next."""
+    count = len(made.joints)
+    joints = "joint" if count == 1 else "joints"
+    yield f"{made.path}: {count} {joints} from {made.base} to {made.tip}"
+    if made.srdf_path is not None:
+        yield f"{made.srdf_path}: links that touch in every position"
+    done = "mend what is listed" if made.problems else "edit the lines marked GUESS"
+    yield f"next: {done}, then reachmap check {made.path}"

@@ -38,13 +38,13 @@ from typing import Any, TypeVar
 import click
 from click.core import ParameterSource
 
+from reachmap.cli.completing import DEFAULT_CELL, complete_cells, complete_keys
 from reachmap.cli.failures import RunState
 from reachmap.runtime.options import RunOptions, available_cores
 
 Decorated = TypeVar("Decorated", bound=Callable[..., Any])
 Decorator = Callable[[Decorated], Decorated]
 
-DEFAULT_CELL = "ur5-eye-in-hand"
 FOR_ALL = frozenset({"cell", "workers", "executor", "progress"})
 
 INPUT_FILE = click.Path(path_type=Path)
@@ -80,11 +80,14 @@ def _option(*declarations: str, **settings: Any) -> Decorator[Any]:
     return click.option(*declarations, cls=SharedOption, **settings)
 
 
-cell_argument = click.argument("cell", default=DEFAULT_CELL, metavar="[CELL]")
+cell_argument = click.argument(
+    "cell", default=DEFAULT_CELL, metavar="[CELL]", shell_complete=complete_cells
+)
 
 cell_option = _option(
     "--cell",
     metavar="CELL",
+    shell_complete=complete_cells,
     help="A shipped cell by name (see reachmap cells), or the path of a cell file.",
 )
 
@@ -93,6 +96,7 @@ set_option = _option(
     "overrides",
     multiple=True,
     metavar="KEY=VALUE",
+    shell_complete=complete_keys,
     help="Override one value of the cell, as in bin_scan.repeats=1. Repeatable; "
     "recorded in the result.",
 )

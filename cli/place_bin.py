@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
 import click
 
+from reachmap.cli.answers import say
 from reachmap.cli.options import (
     INPUT_FILE,
     OUTPUT_PATH,
@@ -177,21 +177,22 @@ def command(
             workspace, output, choice=choice, overrides=overrides, **how
         )
         files = {name: named_output(output, name) for name in several}
-        if as_json:
-            bins = {
-                name: {"output": str(files[name])} | placement_facts(placement)
-                for name, placement in several.items()
-            }
-            click.echo(json.dumps({"bins": bins}))
-            return
-        for name, placement in several.items():
-            lines = placement_lines(placement, files[name], top)
-            click.echo("\n".join([f"bin {name}", *lines]))
+        facts = {
+            name: {"output": str(files[name])} | placement_facts(placement)
+            for name, placement in several.items()
+        }
+        lines = [
+            line
+            for name, placement in several.items()
+            for line in (f"bin {name}", *placement_lines(placement, files[name], top))
+        ]
+        say({"bins": facts}, lambda: "\n".join(lines), as_json=as_json)
         return
     placement = place_bin(
         workspace, output, choice=choice, overrides=with_bin(overrides, bin_name), **how
     )
-    if as_json:
-        click.echo(json.dumps({"output": str(output)} | placement_facts(placement)))
-    else:
-        click.echo("\n".join(placement_lines(placement, output, top)))
+    say(
+        {"output": str(output)} | placement_facts(placement),
+        lambda: "\n".join(placement_lines(placement, output, top)),
+        as_json=as_json,
+    )

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import asdict
 from pathlib import Path
 
 import click
 
+from reachmap.cli.answers import say
 from reachmap.cli.options import (
     INPUT_FILE,
     OUTPUT_PATH,
@@ -149,7 +149,6 @@ def command(
     if not rail:
         unused("rail_range", because="needs --rail")
     from reachmap.cli.text.base import base_lines
-    from reachmap.maps.bytes.to_json import json_ready
     from reachmap.maps.summary.base import summarise_base
     from reachmap.tools.place_robot import RobotChoice, place_robot
 
@@ -176,7 +175,8 @@ def command(
         run=run,
     )
     summary = summarise_base(placement)
-    if as_json:
-        click.echo(json.dumps(json_ready({"output": str(output)} | asdict(summary))))
-    else:
-        click.echo("\n".join([*base_lines(summary), str(output)]))
+    say(
+        {"output": str(output)} | asdict(summary),
+        lambda: "\n".join([*base_lines(summary), str(output)]),
+        as_json=as_json,
+    )

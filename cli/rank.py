@@ -8,10 +8,12 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from reachmap.cli import options
+from reachmap.cli.answers import say
 from reachmap.cli.list_options import list_options
 
 if TYPE_CHECKING:
     from reachmap.ranking.lookup.settings import CostBasis, RankSettings
+    from reachmap.tools.rank import RankAnswer
 
 AXES = ("+x", "-x", "+y", "-y", "+z", "-z")
 
@@ -100,6 +102,7 @@ class ShareType(click.ParamType):  # type: ignore[type-arg, unused-ignore]
     help="Exit with 1 if a list has no reachable grasp.",
 )
 @options.overwrite_option
+@options.json_option
 def command(
     grasps: tuple[str, ...],
     map_path: Path,
@@ -120,6 +123,7 @@ def command(
     overwrite: bool,
     settings: RankSettings,
     basis: CostBasis,
+    as_json: bool,
 ) -> None:
     """Re-order grasp lists by cost, using the bin map alone.
 
@@ -160,15 +164,37 @@ def command(
         chart_top=chart_top,
         overwrite=overwrite,
     )
-    text = answer.explanation or (
-        answer.text if to_stdout else ranking_tables(answer.ranked, top)
+    say(
+        _facts(answer, to_stdout=to_stdout),
+        lambda: (
+            answer.explanation
+            or (answer.text if to_stdout else ranking_tables(answer.ranked, top))
+        ),
+        as_json=as_json,
     )
-    click.echo(text.rstrip("\n"))
     if min_reachable is not None:
         number, percent = min_reachable
         answer.require_reachable(number, percent=percent)
     if fail_if_none_reachable:
         answer.require_reachable(1)
+
+
+def _facts(answer: RankAnswer, *, to_stdout: bool) -> Any:
+    """What is asked for as one JSON value: a story, the lists, or what was written."""
+    if answer.explanation:
+        return {"explanation": answer.explanation}
+    if to_stdout:
+        return answer.documents[0] if len(answer.documents) == 1 else answer.documents
+    lists = [
+        {
+            "list": str(one.grasps.source),
+            "grasps": len(one.grasps),
+            "counts": one.counts(),
+            "doubts": one.doubts,
+        }
+        for one in answer.ranked
+    ]
+    return {"output": [str(path) for path in answer.written], "lists": lists}
 
 
 def _check_options(

@@ -7,13 +7,15 @@ from pathlib import Path
 import click
 
 from reachmap.cli import options
+from reachmap.cli.answers import say
 
 
 @click.command("report")
 @click.argument("folder", metavar="FOLDER", type=options.INPUT_FILE)
 @options.output_option("report.html", help="The page.")
 @options.overwrite_option
-def command(folder: Path, output: Path, overwrite: bool) -> None:
+@options.json_option
+def command(folder: Path, output: Path, overwrite: bool, as_json: bool) -> None:
     """Write a run as one self-contained page.
 
     FOLDER holds workspace.h5, placement.h5, bin.h5, ranked.json and validation.json,
@@ -27,4 +29,5 @@ def command(folder: Path, output: Path, overwrite: bool) -> None:
     """
     from reachmap.tools.report import report
 
-    click.echo(report(folder, output=output, overwrite=overwrite))
+    page = str(report(folder, output=output, overwrite=overwrite))
+    say({"output": page}, lambda: page, as_json=as_json)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import click
 
+from reachmap.cli.answers import say
 from reachmap.cli.options import (
     INPUT_FILE,
     OUTPUT_PATH,
@@ -89,7 +89,6 @@ def command(
     Example: reachmap robust bin.h5 --bin 5mm 1deg --tool 2mm
     """
     from reachmap.cli.text.robustness import robustness_lines
-    from reachmap.maps.bytes.to_json import json_ready
     from reachmap.maps.robustness.summary import summarise_robustness
     from reachmap.robustness.errors import Errors, ErrorSize
     from reachmap.tools.robust import robust
@@ -111,7 +110,8 @@ def command(
         run=run,
     )
     summary = summarise_robustness(found)
-    if as_json:
-        click.echo(json.dumps(json_ready({"output": str(output)} | asdict(summary))))
-    else:
-        click.echo("\n".join([*robustness_lines(summary), str(output)]))
+    say(
+        {"output": str(output)} | asdict(summary),
+        lambda: "\n".join([*robustness_lines(summary), str(output)]),
+        as_json=as_json,
+    )

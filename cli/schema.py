@@ -7,10 +7,14 @@ from typing import Any
 
 import click
 
+from reachmap.cli.answers import say
+from reachmap.cli.options import json_option
+
 
 @click.command()
 @click.argument("name", type=click.Choice(["cell", "grasps", "ranked"]))
-def command(name: Any) -> None:
+@json_option
+def command(name: Any, as_json: bool) -> None:
     """Print the JSON Schema of cells, grasp lists or ranked lists.
 
     Editors that know JSON Schema complete keys and mark mistakes while one types; a
@@ -20,4 +24,9 @@ def command(name: Any) -> None:
     """
     from reachmap.tools.schema import schema
 
-    click.echo(json.dumps(schema(name), indent=2, ensure_ascii=False))
+    found = schema(name)
+    say(
+        found,
+        lambda: json.dumps(found, indent=2, ensure_ascii=False),
+        as_json=as_json,
+    )

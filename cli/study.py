@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import click
 
+from reachmap.cli.answers import say
 from reachmap.cli.options import (
     cell_argument,
     executor_option,
@@ -109,14 +109,14 @@ def command(
     Example: reachmap study ur5-eye-in-hand --vary tube_length=0.119,0.219,0.319
     """
     from reachmap.cli.text.study import study_lines
-    from reachmap.maps.bytes.to_json import json_ready
     from reachmap.maps.summary.study import summarise_study
     from reachmap.tools.study import require_feasible, study
 
     result = study(cell, output, run=run, **settings)
     summary = summarise_study(result)
-    if as_json:
-        click.echo(json.dumps(json_ready({"output": str(output)} | asdict(summary))))
-    else:
-        click.echo("\n".join([*study_lines(summary), str(output)]))
+    say(
+        {"output": str(output)} | asdict(summary),
+        lambda: "\n".join([*study_lines(summary), str(output)]),
+        as_json=as_json,
+    )
     require_feasible(result)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
 from reachmap.cli import options
+from reachmap.cli.answers import say
 from reachmap.cli.list_options import list_options
 from reachmap.runtime.options import RunOptions
 
@@ -128,6 +128,4 @@ def command(
         calibrate=calibrate,
         run=run,
     )
-    click.echo(
-        json.dumps(answer.facts) if as_json else validation_text(answer.validation)
-    )
+    say(answer.facts, lambda: validation_text(answer.validation), as_json=as_json)

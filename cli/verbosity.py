@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import logging
+import re
 import sys
 
 import click
 
+from reachmap import __version__
 from reachmap.cli.failures import RunState
 
 LEVELS = (logging.ERROR, logging.WARNING, logging.INFO, logging.DEBUG)
 NORMAL = LEVELS.index(logging.WARNING)
+ARGUMENTS = "reachmap.arguments"
+"""Key of the words of the command line in the context: --version may stand first."""
+ENGINES_WANTED = re.compile(r"-v+|--verbose")
 
 
 class _StderrHandler(logging.StreamHandler):  # type: ignore[type-arg]
@@ -43,6 +48,20 @@ def _debug(ctx: click.Context, parameter: click.Parameter, value: bool) -> None:
     state = ctx.find_root().obj
     if isinstance(state, RunState) and value:
         state.debug = True
+
+
+def show_version(ctx: click.Context, parameter: click.Parameter, value: bool) -> None:
+    """Print the version and end; with ``-v`` anywhere, of what it stands on, too."""
+    if not value or ctx.resilient_parsing:
+        return
+    click.echo(f"reachmap {__version__}")
+    if any(ENGINES_WANTED.fullmatch(word) for word in ctx.meta.get(ARGUMENTS, ())):
+        # Imported here: a bare version needs no NumPy.
+        from reachmap.maps.provenance import package_versions
+
+        for name, version in package_versions().items():
+            click.echo(f"{name} {version}")
+    ctx.exit()
 
 
 def verbosity_parameters() -> list[click.Parameter]:

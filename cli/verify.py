@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import click
 
+from reachmap.cli.answers import say
 from reachmap.cli.options import INPUT_FILE, json_option
 
 
@@ -26,9 +26,9 @@ def command(files: tuple[Path, ...], as_json: bool) -> None:
     from reachmap.tools.verify import verify
 
     found = verify(files)
-    if as_json:
-        click.echo(json.dumps(found.facts()))
-    else:
-        for verdict in found.whole:
-            click.echo(verdict.text)
+    say(
+        found.facts(),
+        lambda: "\n".join(verdict.text for verdict in found.whole),
+        as_json=as_json,
+    )
     found.require_whole()

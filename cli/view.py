@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from reachmap.cli import options
+from reachmap.cli.answers import say
 
 HOST, PORT = "127.0.0.1", 8080
 
@@ -66,6 +67,7 @@ def _test_grasp(
     help="Open the live view in the browser, or only print its address.",
 )
 @options.overwrite_option
+@options.json_option
 def command(
     source: Path,
     page: Path | None,
@@ -74,6 +76,7 @@ def command(
     host: str,
     open_browser: bool,
     overwrite: bool,
+    as_json: bool,
 ) -> None:
     """Look at a cell or an artefact in 3D, in the browser.
 
@@ -101,7 +104,10 @@ def command(
         test_grasps=test_grasps,
         overwrite=overwrite,
         options=ViewOptions(host=host, port=port, open_browser=open_browser),
-        on_ready=lambda address: click.echo(f"{address}  (Ctrl-C ends)"),
+        on_ready=lambda address: say(
+            {"address": address}, lambda: f"{address}  (Ctrl-C ends)", as_json=as_json
+        ),
     )
     if written is not None:
-        click.echo(written)
+        page_name = str(written)
+        say({"output": page_name}, lambda: page_name, as_json=as_json)

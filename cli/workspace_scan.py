@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import click
 
+from reachmap.cli.answers import say
 from reachmap.cli.options import (
     cell_argument,
     check_scan_options,
@@ -81,4 +81,4 @@ def command(
             run=run,
         )
         facts = {"output": str(written_by(output, run))} | summary_of_workspace(result)
-    click.echo(json.dumps(facts) if as_json else facts_text(facts))
+    say(facts, lambda: facts_text(facts), as_json=as_json)

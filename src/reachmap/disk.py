@@ -55,3 +55,8 @@ def is_text(name: str) -> bool:
         # The locale cannot spell it, which does not keep it from being stored.
         return not any("\ud800" <= letter <= "\udfff" for letter in name)
     return True
+
+
+def as_path(name: str | Path | None) -> Path | None:
+    """Path of a name; None stays None."""
+    return None if name is None else Path(name)

@@ -147,9 +147,10 @@ def test_four_mistakes_are_four_lines(tmp_path: Path) -> None:
     assert caught.value.lines == (
         f"{path}:6:17: robot.tcp.parent: no frame 'tipp' in the URDF; "
         "did you mean 'tip'?",
-        f"{path}:10:13: bodies.0.shape.bx: unknown key; did you mean 'box'?",
+        f"{path}:10:13: bodies[post].shape.bx: unknown key; did you mean 'box'?",
         f"{path}:14:22: bin.pose.xyz.2: expected a number (got 'abc')",
-        f"{path}:18:65: workspace_scan.cubes.0.grid.1: expected a number >= 1 (got 0)",
+        f"{path}:18:65: workspace_scan.cubes[one].grid.1: expected a number >= 1 "
+        "(got 0)",
     )
 
 
@@ -165,7 +166,7 @@ def test_files_that_are_missing_are_mistakes_with_places(tmp_path: Path) -> None
     assert starts == [
         f"{path}:5:9: robot.urdf",
         f"{path}:8:17: robot.joint_limits",
-        f"{path}:12:26: bodies.0.shape.mesh.file",
+        f"{path}:12:26: bodies[post].shape.mesh.file",
     ]
     (tmp_path / "cell.yaml").write_text(text.replace("none.urdf", "mini.urdf"))
     with pytest.raises(CellError, match=r":6:9: robot\.srdf: file 'none\.srdf'"):
@@ -263,7 +264,7 @@ def test_wrong_moveit_limits_are_refused(
         ("turn: 90, ", "", "q_deg: joints are missing: turn"),
         ("name: post", "name: arm", "'arm' is the name of a link"),
         ("name: post", "name: bin", "'bin' is the name of a link, a frame or the bin"),
-        ("name: post", "name: bin wall", "bodies.0.name: "),
+        ("name: post", "name: bin wall", "bodies[bin wall].name: "),
         ("name: post", "name: post\n    touch: [bse]", "no link or body 'bse'"),
         ("name: post", "name: post\n    attach_to: no", "no frame 'no' in the URDF"),
         ("parent: tip", "parent: base", "no joint moves between the base and the TCP"),
@@ -376,7 +377,9 @@ def test_a_changed_or_missing_mesh_of_an_artefact_is_refused(tmp_path: Path) -> 
     with pytest.raises(CellError, match=r"map\.h5: mesh 'body post: post\.stl' has ch"):
         again()
     (tmp_path / "post.stl").unlink()
-    with pytest.raises(CellError, match=r"map\.h5: bodies\.0.*post\.stl.* not found"):
+    with pytest.raises(
+        CellError, match=r"map\.h5: bodies\[post\].*post\.stl.* not found"
+    ):
         again()
     stored = stored_cell(loaded.resolved_json).cell
     assert stored == loaded.cell

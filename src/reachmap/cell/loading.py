@@ -55,7 +55,7 @@ def shipped_cells() -> dict[str, Path]:
     return {path.stem: path for path in sorted(shipped_folder().glob("*.yaml"))}
 
 
-def read_cell(name_or_path: str, overrides: Sequence[str] = ()) -> LoadedCell:
+def read_cell(name_or_path: str | Path, overrides: Sequence[str] = ()) -> LoadedCell:
     """Read a cell, with everything it refers to.
 
     Parameters
@@ -70,6 +70,7 @@ def read_cell(name_or_path: str, overrides: Sequence[str] = ()) -> LoadedCell:
     CellError
         Every mistake is a line ``file:line:column: key.path: …``.
     """
+    name_or_path = str(name_or_path)
     path = cell_path(str(name_or_path))
     if not is_text(str(path.absolute())):
         name = recorded_name(str(path.absolute()))

@@ -49,6 +49,17 @@ class PathStore:
     def __post_init__(self) -> None:
         freeze(self)
 
+    def __len__(self) -> int:
+        return len(self.row_size)
+
+    def __getitem__(self, row: int) -> FloatArray:
+        """Way-points of one path, shape (n, dof) [rad]."""
+        if not -len(self) <= row < len(self):
+            raise IndexError(f"there are {len(self)} paths (got {row})")
+        row %= len(self)
+        start = int(self.row_size[:row].sum())
+        return self.configuration[start : start + int(self.row_size[row])]
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Components:

@@ -21,6 +21,7 @@ from reachmap.maps.parts import (
     PathStore,
     freeze,
 )
+from reachmap.maps.showing import Shown, ShownBin
 from reachmap.sampling.lattice import Lattice, Stitching, pooled_percent, stitch
 
 NO_PAIR = -1
@@ -153,8 +154,7 @@ class CubeMap:
             "ik_free": self.n_ik_free > 0,
         }[kind]
         attempted = self.status != Status.NOT_ATTEMPTED
-        hits = (hit & attempted).sum(axis=-1)
-        return hits.astype(float), attempted.sum(axis=-1).astype(float)
+        return (hit & attempted).sum(-1, dtype=float), attempted.sum(-1, dtype=float)
 
     def percent(self, kind: str) -> FloatArray:
         """Eq. (1): share of frames per point [percent], shape (nz, ny, nx).
@@ -169,8 +169,8 @@ class CubeMap:
         return percent
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class WorkspaceMap:
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class WorkspaceMap(Shown):
     """Path reachability over the cubes, seen from one scan configuration.
 
     ``x``, ``y``, ``z`` and the three percentages are the stitched lattice, where
@@ -200,8 +200,8 @@ class WorkspaceMap:
         freeze(self)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class BinMap:
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class BinMap(ShownBin):
     """Every attempt at every test grasp of a bin.
 
     Index order (layer, y, x, orientation, repeat). ``x``, ``y``, ``layer`` [m] are
@@ -292,8 +292,8 @@ class BinMap:
         freeze(self)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class BinPlacement:
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class BinPlacement(Shown):
     """Where the bin goes, the configuration it is imaged from, and the runners-up.
 
     Candidates are rows: the chosen one is row ``chosen``.

@@ -132,10 +132,7 @@ def way_points(record: BinMap, row: int) -> tuple[FloatArray, FloatArray]:
 
     The last of the first is the first of the second.
     """
-    paths = record.paths
-    start = int(paths.row_size[:row].sum())
-    path = paths.configuration[start : start + int(paths.row_size[row])]
-    planned = int(paths.planned_size[row])
+    path, planned = record.path(row), int(record.paths.planned_size[row])
     return path[:planned], path[planned - 1 :]
 
 

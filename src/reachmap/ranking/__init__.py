@@ -22,7 +22,7 @@ from reachmap.ranking.answers.ranked_list import (
 from reachmap.ranking.lists.arrays import GraspList
 from reachmap.ranking.lists.reading import grasps_from_document, read_grasps
 from reachmap.ranking.lookup.approach import align, rotation_between
-from reachmap.ranking.lookup.order import OUTSIDE_MAP, Ranking
+from reachmap.ranking.lookup.order import OUTSIDE_MAP, Ranking, status_name
 from reachmap.ranking.lookup.ranker import Ranker
 from reachmap.ranking.lookup.settings import CostBasis, RankSettings
 
@@ -41,4 +41,5 @@ __all__ = [
     "ranked_document",
     "read_grasps",
     "rotation_between",
+    "status_name",
 ]

@@ -11,6 +11,7 @@ import numpy as np
 
 from reachmap.cell.loading import read_cell
 from reachmap.core.scene import Scene
+from reachmap.disk import as_path
 from reachmap.maps import (
     BinMap,
     Status,
@@ -46,11 +47,11 @@ SAMPLE_GRASPS = 20
 
 
 def bin_scan(
-    placement: Path | None,
-    output: Path,
+    placement: str | Path | None,
+    output: str | Path,
     *,
-    cell: str | None = None,
-    workspace: Path | None = None,
+    cell: str | Path | None = None,
+    workspace: str | Path | None = None,
     overrides: Sequence[str] = (),
     seed: int | None = None,
     run: RunOptions = IN_PROCESS,
@@ -83,6 +84,9 @@ def bin_scan(
     ReachmapError
         See :mod:`reachmap.errors`.
     """
+    output = Path(output)
+    placement, workspace = as_path(placement), as_path(workspace)
+    cell = None if cell is None else str(cell)
     check_scan_output(output, run, [placement, workspace, path_of_cell(cell)])
     loaded, source = load_placed_cell(
         placement, cell, with_seed(overrides, seed), workspace

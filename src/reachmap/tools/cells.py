@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -39,17 +40,18 @@ def _summary(name: str, path: Path) -> CellSummary:
 
 
 def export_cell(
-    artefact: Path, *, output: Path | None = None, overwrite: bool = False
+    source: str | Path, *, output: str | Path | None = None, overwrite: bool = False
 ) -> str:
-    """Write the cell that an artefact was made from as YAML.
+    """Write a shipped cell, or the cell that an artefact was made from, as YAML.
 
-    The cell is the resolved one: overrides, a chosen bin pose and a chosen scan
-    configuration are in it.
+    A shipped cell is written as it stands, with its comments, so that it can be edited;
+    files beside it are named by their whole path. That of an artefact is the resolved
+    one: overrides, a chosen bin pose and a chosen scan configuration are in it.
 
     Parameters
     ----------
-    artefact : Path
-        Any artefact.
+    source : str or Path
+        Name of a shipped cell, or any artefact.
     output : Path, optional
         Where to write; not written where omitted.
     overwrite : bool
@@ -60,13 +62,31 @@ def export_cell(
     str
         The YAML text.
     """
+    shipped = shipped_cells().get(str(source))
+    if output is not None:
+        inputs = [shipped or source]
+        check_output(Path(output), overwrite=overwrite, inputs=inputs)
+    if shipped is not None and not Path(source).exists():
+        text = _standing_alone(shipped)
+    else:
+        text = _cell_of(Path(source))
+    if output is not None:
+        publish(Path(output), [text.encode()], overwrite=overwrite)
+    return text
+
+
+def _standing_alone(path: Path) -> str:
+    """Text of a shipped cell whose files are found from any folder."""
+    text = read_text(path, limit=MAX_TEXT_BYTES)
+    beside = f"{path.stem}/"
+    if (path.parent / beside).is_dir():
+        text = re.sub(rf"(?<=: ){re.escape(beside)}", f"{path.parent}/{beside}", text)
+    return text
+
+
+def _cell_of(artefact: Path) -> str:
     from reachmap.maps import read_provenance
 
-    if output is not None:
-        check_output(output, overwrite=overwrite, inputs=[artefact])
     kept = read_provenance(artefact)
     cell = stored_cell(kept.cell_resolved_json, source=str(artefact)).cell
-    text = cell_yaml(cell, comment=f"Cell of {artefact.name}, as resolved by reachmap.")
-    if output is not None:
-        publish(output, [text.encode()], overwrite=overwrite)
-    return text
+    return cell_yaml(cell, comment=f"Cell of {artefact.name}, as resolved by reachmap.")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -99,7 +100,7 @@ class CellCheck:
     problems: tuple[str, ...]
 
 
-def check(name_or_path: str, overrides: Sequence[str] = ()) -> CellCheck:
+def check(name_or_path: str | Path, overrides: Sequence[str] = ()) -> CellCheck:
     """Load a cell, build its scene with the bin, and test the scan configuration.
 
     Parameters
@@ -114,6 +115,7 @@ def check(name_or_path: str, overrides: Sequence[str] = ()) -> CellCheck:
         The cell cannot be loaded or its scene cannot be built. A scan configuration
         that cannot be taken is in ``problems`` instead.
     """
+    name_or_path = str(name_or_path)
     return check_loaded(read_cell(name_or_path, overrides))
 
 

@@ -85,8 +85,8 @@ class MapComparison:
 
 
 def compare(
-    before: Path,
-    after: Path,
+    before: str | Path,
+    after: str | Path,
     *,
     frame: Frame = "robot_base",
     tolerance_m: float = TOLERANCE_M,
@@ -111,6 +111,7 @@ def compare(
     SettingsError
         The maps are of different kinds or have no pose in common.
     """
+    before, after = Path(before), Path(after)
     a, b = _read_map(before), _read_map(after)
     kinds = [kind_of(record).replace("_", " ") for record in (a, b)]
     if kinds[0] != kinds[1]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from reachmap.core.robot.model import RobotModel
+from reachmap.disk import as_path
 from reachmap.errors import SettingsError
 from reachmap.maps import read_bin_map
 from reachmap.maps.bytes.publish import check_outputs, publish
@@ -26,12 +27,12 @@ class Exported:
 
 
 def export(
-    map_path: Path,
+    map_path: str | Path,
     *,
     grasps: Sequence[str] = (),
     every: bool = False,
     to: str = "csv",
-    output: Path | None = None,
+    output: str | Path | None = None,
     overwrite: bool = False,
 ) -> Exported:
     """Write the best stored paths of a bin map for a controller or a program.
@@ -55,6 +56,8 @@ def export(
         Nothing or too much was named, or the format cannot say it.
     MapFileError, OutputError
     """
+    map_path = Path(map_path)
+    output = as_path(output)
     if every == bool(grasps):
         raise SettingsError("name test grasps with --grasp, or take --all of them")
     if to not in WRITERS:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Literal
 
+from reachmap.disk import as_path
 from reachmap.errors import SettingsError
 from reachmap.maps import (
     artefact_kind,
@@ -40,12 +41,12 @@ logger = logging.getLogger(__name__)
 
 
 def heatmap(
-    artefact: Path,
+    artefact: str | Path,
     *,
-    output: Path,
+    output: str | Path,
     quantity: Quantity | Literal["all"] | None = None,
     levels: Sequence[float] = (),
-    workspace: Path | None = None,
+    workspace: str | Path | None = None,
     percent_map: PercentMap = "RdYlGn",
     kind: Format = "png",
     tables: bool = False,
@@ -78,6 +79,8 @@ def heatmap(
     tuple of Path
         The files written.
     """
+    artefact, output = Path(artefact), Path(output)
+    workspace = as_path(workspace)
     found = artefact_kind(artefact)
     if found in NO_LEVELS and (quantity or levels):
         raise SettingsError(

@@ -87,7 +87,7 @@ class ArtefactInfo:
         return dict(json_ready(facts))
 
 
-def info(path: Path) -> ArtefactInfo:
+def info(path: str | Path) -> ArtefactInfo:
     """Summarise an artefact, or what the journal of a run holds so far.
 
     Parameters
@@ -99,6 +99,7 @@ def info(path: Path) -> ArtefactInfo:
     MapFileError
         The file is missing, damaged, or neither artefact nor journal.
     """
+    path = Path(path)
     record, finished = read_artefact_or_journal(path)
     summary: Summary
     if isinstance(record, WorkspaceMap):

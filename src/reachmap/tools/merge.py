@@ -10,7 +10,9 @@ from reachmap.runtime.merge import merge_journals
 from reachmap.runtime.run import Outcome
 
 
-def merge(shards: Sequence[Path], *, output: Path, overwrite: bool = False) -> Outcome:
+def merge(
+    shards: Sequence[str | Path], *, output: str | Path, overwrite: bool = False
+) -> Outcome:
     """Join the journals of shards; see :func:`reachmap.runtime.merge.merge_journals`.
 
     Parameters
@@ -26,5 +28,8 @@ def merge(shards: Sequence[Path], *, output: Path, overwrite: bool = False) -> O
     -------
     Outcome
     """
+    output = Path(output)
     check_outputs([output], overwrite=overwrite, inputs=shards)
-    return merge_journals(shards, output=output, overwrite=overwrite)
+    return merge_journals(
+        [Path(shard) for shard in shards], output=output, overwrite=overwrite
+    )

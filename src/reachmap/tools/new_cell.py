@@ -29,6 +29,7 @@ from reachmap.core.kinematics.any_roll import has_own_roll
 from reachmap.core.kinematics.kinematics import Kinematics
 from reachmap.core.robot.model import RobotModel
 from reachmap.core.scene import Scene
+from reachmap.disk import as_path
 from reachmap.errors import CellError, ReachmapError, SceneError, SettingsError
 from reachmap.geometry import quaternion_wxyz_from_rotation
 from reachmap.maps.bytes.publish import check_output, publish
@@ -70,14 +71,14 @@ class NewCell:
 
 
 def new_cell(
-    urdf: str,
+    urdf: str | Path,
     *,
-    output: Path,
+    output: str | Path,
     base: str | None = None,
     tip: str | None = None,
     packages: Mapping[str, str] | None = None,
     xacro_args: Mapping[str, str] | None = None,
-    moveit_config: Path | None = None,
+    moveit_config: str | Path | None = None,
     overwrite: bool = False,
 ) -> NewCell:
     """Write a commented starter cell for a robot.
@@ -107,6 +108,9 @@ def new_cell(
     CellError, SettingsError, OutputError
         The URDF cannot be used, a link does not exist, or nothing can be written.
     """
+    output = Path(output)
+    moveit_config = as_path(moveit_config)
+    urdf = str(urdf)
     target = check_output(output, overwrite=overwrite, inputs=[urdf])
     folder = target.parent
     srdf_target = target.with_suffix(".srdf")

@@ -16,6 +16,7 @@ from reachmap.cell.model.tool import LISTED
 from reachmap.core.collision.bin_fit import BinFit
 from reachmap.core.collision.camera import Camera
 from reachmap.core.scene import Scene
+from reachmap.disk import as_path
 from reachmap.errors import SceneError, SettingsError
 from reachmap.geometry import inverse_transform
 from reachmap.maps import (
@@ -111,13 +112,13 @@ class PlacementChoice:
 
 
 def place_bin(
-    workspace: Path,
-    output: Path,
+    workspace: str | Path,
+    output: str | Path,
     *,
     choice: PlacementChoice | None = None,
     overrides: Sequence[str] = (),
     seed: int | None = None,
-    picture: Path | None = None,
+    picture: str | Path | None = None,
     run: RunOptions = IN_PROCESS,
 ) -> BinPlacement:
     """Choose where the bin stands, and the configuration it is imaged from.
@@ -146,6 +147,8 @@ def place_bin(
     ReachmapError
         See :mod:`reachmap.errors`.
     """
+    workspace, output = Path(workspace), Path(output)
+    picture = as_path(picture)
     choice = choice or PlacementChoice()
     check_choice(choice)
     check_picture(picture, "--picture")

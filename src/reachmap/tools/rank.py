@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from reachmap.disk import as_path
 from reachmap.errors import GateFailedError, MapFileError, SettingsError
 from reachmap.maps import read_bin_map
 from reachmap.maps.bytes.publish import check_outputs, check_picture, publish
@@ -99,16 +100,16 @@ def rank(
     sources: Sequence[str | Path],
     *,
     map_path: str | Path = "bin.h5",
-    output: Path | None = None,
+    output: str | Path | None = None,
     settings: RankSettings | None = None,
     basis: CostBasis | None = None,
     list_format: ListFormat | None = None,
-    cell: str | None = None,
+    cell: str | Path | None = None,
     overrides: Sequence[str] = (),
     force: bool = False,
     top: int | None = None,
     explain: str | None = None,
-    chart: Path | None = None,
+    chart: str | Path | None = None,
     chart_top: int = 10,
     overwrite: bool = False,
 ) -> RankAnswer:
@@ -142,6 +143,8 @@ def rank(
     ------
     GraspListError, MapFileError, SettingsError, OutputError
     """
+    output, chart = as_path(output), as_path(chart)
+    cell = None if cell is None else str(cell)
     settings, list_format = settings or RankSettings(), list_format or ListFormat()
     _check_request(sources, top, chart_top)
     check_picture(chart, "--chart")

@@ -12,7 +12,7 @@ from reachmap.report.folder import RunFolder, read_run_folder, usual_files
 from reachmap.report.page import report_page
 
 
-def report(folder: Path, *, output: Path, overwrite: bool = False) -> Path:
+def report(folder: str | Path, *, output: str | Path, overwrite: bool = False) -> Path:
     """Write a run as one page that can be sent to somebody.
 
     Parameters
@@ -37,6 +37,7 @@ def report(folder: Path, *, output: Path, overwrite: bool = False) -> Path:
     OutputError
         The page exists or cannot be written.
     """
+    folder, output = Path(folder), Path(output)
     check_outputs([output], overwrite=overwrite, inputs=usual_files(folder))
     run = read_run_folder(folder)
     page = report_page(run, _cell(run))

@@ -6,8 +6,6 @@ import json
 from importlib import resources
 from typing import Any, Literal
 
-from reachmap.cell.model.cell import cell_schema
-
 SchemaName = Literal["cell", "grasps", "ranked"]
 
 
@@ -19,6 +17,9 @@ def schema(name: SchemaName) -> dict[str, Any]:
     name : {"cell", "grasps", "ranked"}
     """
     if name == "cell":
+        # Imported here: an installation for ranking alone has no cells.
+        from reachmap.cell.model.cell import cell_schema
+
         return cell_schema()
     folder = resources.files("reachmap.ranking")
     text = folder.joinpath(f"{name}-1.schema.json").read_text(encoding="utf-8")

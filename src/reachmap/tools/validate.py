@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from reachmap.disk import as_path
 from reachmap.errors import GraspListError, SettingsError
 from reachmap.maps import read_bin_map
 from reachmap.maps.bytes.publish import check_outputs, check_picture, publish
@@ -94,8 +95,8 @@ def validate(
     list_format: ListFormat | None = None,
     pick: PickOptions | None = None,
     top: int = 10,
-    output: Path | None = None,
-    chart: Path | None = None,
+    output: str | Path | None = None,
+    chart: str | Path | None = None,
     calibrate: bool = False,
     run: RunOptions = IN_PROCESS,
 ) -> ValidateAnswer:
@@ -130,6 +131,7 @@ def validate(
     ReachmapError
         See :mod:`reachmap.errors`.
     """
+    output, chart = as_path(output), as_path(chart)
     asked, pick = settings or RankSettings(), pick or PickOptions()
     # Ways in are judged by J, and cycles by seconds, whatever is asked for.
     settings = settings_in_j(asked)

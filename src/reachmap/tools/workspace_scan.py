@@ -39,8 +39,8 @@ SAMPLE_FRAMES = 200
 
 
 def workspace_scan(
-    cell: str,
-    output: Path,
+    cell: str | Path,
+    output: str | Path,
     *,
     method: str = "roadmap",
     with_bin: bool = False,
@@ -76,6 +76,8 @@ def workspace_scan(
     ReachmapError
         See :mod:`reachmap.errors`.
     """
+    output = Path(output)
+    cell = str(cell)
     _check_method(method, run)
     check_scan_output(output, run, [path_of_cell(cell)])
     loaded = read_cell(cell, with_seed(overrides, seed))

@@ -28,6 +28,7 @@ from ruamel.yaml.events import (
     SequenceStartEvent,
 )
 
+from reachmap.cell.text.data import at, text_at
 from reachmap.errors import CellError
 
 MAX_TEXT_BYTES = 256_000
@@ -73,9 +74,24 @@ class Mistake:
     message: str
     location: Location = ()
 
-    def __str__(self) -> str:
-        path = ".".join(str(part) for part in self.location)
+    def text(self, data: Any) -> str:
+        """The mistake in one line, with the names that entries of lists have."""
+        path = spelled(self.location, data)
         return f"{self.place}: {path + ': ' if path else ''}{self.message}"
+
+
+def spelled(location: Location, data: Any) -> str:
+    """Path as people read it; an entry of a list goes by its name if it has one.
+
+    >>> spelled(("bodies", 0, "pose"), {"bodies": [{"name": "post", "pose": 1}]})
+    'bodies[post].pose'
+    """
+    path = ""
+    for part in location:
+        data = at(data, part)
+        name = text_at(data, "name") if isinstance(part, int) else None
+        path += f"[{name}]" if name else f".{part}"
+    return path.removeprefix(".")
 
 
 @dataclass(slots=True, kw_only=True)
@@ -134,7 +150,7 @@ class Document:
         ordered = sorted(
             self.mistakes, key=lambda m: (m.place.source, m.place.line, m.place.column)
         )
-        raise CellError(dict.fromkeys(str(mistake) for mistake in ordered))
+        raise CellError(dict.fromkeys(one.text(self.data) for one in ordered))
 
 
 def read_text(path: Path, *, limit: int, label: str | None = None) -> str:

@@ -4,17 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Final, TypeAlias
+from typing import Any, Final, TypeAlias
 
 from reachmap.maps.base.format import BASE, base_from_tree
 from reachmap.maps.base.record import BasePlacement
 from reachmap.maps.bytes.tree import Tree
 from reachmap.maps.format.assembly import provenance_of
-from reachmap.maps.format.bin import BIN, bin_map_from_tree
+from reachmap.maps.format.bin import BIN, bin_map_from_tree, tree_from_bin_map
 from reachmap.maps.format.layout import Layout
-from reachmap.maps.format.placement import PLACEMENT, placement_from_tree
+from reachmap.maps.format.placement import (
+    PLACEMENT,
+    placement_from_tree,
+    tree_from_placement,
+)
 from reachmap.maps.format.store import load
-from reachmap.maps.format.workspace import WORKSPACE, workspace_map_from_tree
+from reachmap.maps.format.workspace import (
+    WORKSPACE,
+    tree_from_workspace_map,
+    workspace_map_from_tree,
+)
 from reachmap.maps.records import BinMap, BinPlacement, Provenance, WorkspaceMap
 from reachmap.maps.robustness.format import ROBUSTNESS, robustness_from_tree
 from reachmap.maps.robustness.record import Robustness
@@ -35,7 +43,7 @@ _RECORDS: Final[dict[str, Callable[[Tree, Path], Artefact | Result]]] = {
 }
 
 
-def read_artefact(path: Path) -> Artefact | Result:
+def read_artefact(path: str | Path) -> Artefact | Result:
     """Read an artefact of any kind; everything about it is checked.
 
     Raises
@@ -43,6 +51,7 @@ def read_artefact(path: Path) -> Artefact | Result:
     MapFileError
         The file is missing, damaged, or no artefact at all.
     """
+    path = Path(path)
     tree, layout = load_any(path)
     return _RECORDS[layout.kind](tree, path)
 
@@ -58,6 +67,15 @@ def kind_of(record: Artefact | Result) -> str:
     if isinstance(record, BasePlacement):
         return "base_placement"
     return "bin_map" if isinstance(record, BinMap) else "bin_placement"
+
+
+def tree_of(record: Any) -> Tree:
+    """What the file of a map will hold."""
+    if isinstance(record, BinMap):
+        return tree_from_bin_map(record)
+    if isinstance(record, WorkspaceMap):
+        return tree_from_workspace_map(record)
+    return tree_from_placement(record)
 
 
 LAYOUTS: Final[dict[str, Layout]] = {
