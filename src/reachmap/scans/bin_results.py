@@ -161,6 +161,12 @@ class GraspResults:
         )
 
 
+_AS_THEY_ARE = (
+    "status", "blocking_pair", "n_ik", "n_ik_free", "connected", "path_found",
+    "hit_time_limit",
+)  # fmt: skip
+
+
 def assemble_bin_map(
     document: Mapping[str, Any],
     results: GraspResults,
@@ -192,7 +198,7 @@ def assemble_bin_map(
     known = (results.status != Status.NOT_ATTEMPTED).reshape(shape)
     with np.errstate(invalid="ignore"):
         percent = 100.0 * found.sum(-1) / known.sum(-1)
-    cycle = results.cycle
+    cycle, rolls_are_listed = results.cycle, cell.tool.roll == LISTED
     quaternion = np.broadcast_to(grid.frames.quaternion_wxyz, (*shape, 4))
     best = _best_paths(results)
     return BinMap(
@@ -206,13 +212,7 @@ def assemble_bin_map(
         quaternion_wxyz=quaternion.copy(),
         approach_axis=cell.robot.tcp.approach_axis,
         approach_distance=approach_distance_m(cell),
-        status=shaped(results.status),
-        blocking_pair=shaped(results.blocking_pair),
-        n_ik=shaped(results.n_ik),
-        n_ik_free=shaped(results.n_ik_free),
-        connected=shaped(results.connected),
-        path_found=shaped(results.path_found),
-        hit_time_limit=shaped(results.hit_time_limit),
+        **{name: shaped(getattr(results, name)) for name in _AS_THEY_ARE},
         **_of_attempts(results, shaped),
         goal_configuration=shaped(_ends(results, best)),
         component=None if components is None else shaped(results.component),
@@ -220,13 +220,9 @@ def assemble_bin_map(
         best=BestPaths(
             **{name: shaped(getattr(best, name)) for name in BestPaths.__slots__}
         ),
-        winning_roll=(
-            None if cell.tool.roll == LISTED else shaped(results.winning_roll)
-        ),
+        winning_roll=None if rolls_are_listed else shaped(results.winning_roll),
         margins=_margins(shaped(results.margins)),
-        cycle=None
-        if cycle is None
-        else cycle.section(document["stages"], known, shaped),
+        cycle=cycle.section(document["stages"], known, shaped) if cycle else None,
         path_reachability=percent,
         scan_configuration=np.array(document["scan_configuration"], float),
         joint_names=tuple(document["joint_names"]),
