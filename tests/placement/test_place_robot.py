@@ -262,3 +262,15 @@ def test_places_out_of_reach_of_the_drop_off_are_excluded(tmp_path: Path) -> Non
     assert no_way.any()
     assert free.any()
     assert away[placement.chosen] <= 0.7 + 1e-6
+
+
+def test_only_the_cells_own_mounting_has_a_present_place(tmp_path: Path) -> None:
+    """Upside down at its own place the arm is not the cell as it is."""
+    choice = dataclasses.replace(SMALL, mountings=("ceiling", "floor"), top=1)
+    placement = placed(tmp_path, choice=choice)
+    assert placement.mountings[placement.mounting[placement.present]] == "floor"
+    assert np.allclose(placement.candidate_position[placement.present], 0.0)
+    summary = summarise_base(placement)
+    assert [item.mounting for item in summary.best_of] == ["ceiling", "floor"]
+    with pytest.raises(SettingsError, match="--mount"):
+        placed(tmp_path, choice=dataclasses.replace(choice, mountings=("200",)))

@@ -233,6 +233,8 @@ def _searched(
         question=question,
         outcome=outcome,
         T_world_level=T_world_level,
+        is_own=isinstance(how, RailMounting)
+        or bool(np.allclose(how.lean, T_level_base[:3, :3])),
     )
 
 

@@ -34,7 +34,20 @@ from reachmap.scans.document import (
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class BaseSearch:
-    """One arm in one mounting, and its outcome."""
+    """One arm in one mounting, and its outcome.
+
+    Attributes
+    ----------
+    arm, mounting : int
+        Of what is compared.
+    loaded : LoadedCell
+        With this arm, in its own world.
+    question : BaseQuestion
+    outcome : BaseOutcome
+    T_world_level : array, shape (4, 4)
+    is_own : bool
+        Whether the base is mounted as the cell has it.
+    """
 
     arm: int
     mounting: int
@@ -42,6 +55,7 @@ class BaseSearch:
     question: BaseQuestion
     outcome: BaseOutcome
     T_world_level: FloatArray
+    is_own: bool
 
     def pose(self, row: int) -> Pose:
         """Pose of a row of its table."""
@@ -93,7 +107,7 @@ def base_placement(
         rail=rail,
         chosen=int(first[ranked[0]]) + best.outcome.chosen,
         runner_up=_runner_up(searches, ranked, first, rows),
-        present=searches[0].outcome.present,
+        present=_present(searches, first),
         arms=arms,
         mountings=mountings,
         best_of=_best_of(searches, found, first, (len(arms), len(mountings))),
@@ -129,6 +143,14 @@ def _document(final: LoadedCell, settings: Mapping[str, Any]) -> dict[str, Any]:
             "base_placement": base_settings() | dict(settings),
         },
     )
+
+
+def _present(searches: Sequence[BaseSearch], first: IntArray) -> int:
+    """Row of the cell as it is, -1 where it is in none of the searches."""
+    for k, search in enumerate(searches):
+        if search.arm == 0 and search.is_own and search.outcome.present != NO_ROW:
+            return int(first[k]) + search.outcome.present
+    return NO_ROW
 
 
 def _runner_up(
