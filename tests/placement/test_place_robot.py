@@ -17,7 +17,12 @@ from reachmap.geometry import yaw_transform
 from reachmap.maps.base.format import read_base, write_base
 from reachmap.maps.summary.base import summarise_base
 from reachmap.placement.base.fit import BaseFit
-from reachmap.placement.base.lattice import base_region, facing, smoothed
+from reachmap.placement.base.lattice import (
+    base_lattice,
+    base_region,
+    facing,
+    smoothed,
+)
 from reachmap.placement.base.mounting import AS_IT_IS, Mounting
 from reachmap.runtime.options import RunOptions
 from reachmap.tools.bin_scan import load_placed_cell
@@ -198,6 +203,19 @@ def test_the_base_faces_the_bin_as_before():
     for x, y in ((0.4, 0.3), (-0.2, -0.7), (0.6, -0.1)):
         bearing = np.arctan2(-y, -x) - facing(region, own, x, y)
         assert np.cos(bearing - seen) == pytest.approx(1.0)
+
+
+def test_a_rail_is_searched_to_its_ends():
+    """Positions on a rail are no distances from the bin, so reach does not end them."""
+    own = (0.5, 0.0, 0.0, 0.0)
+    zero = {"y": 0.0, "z": 0.0, "yaw": 0.0}
+    region = base_region(own, 1.0, {"x": (0.0, 3.0)}, zero)
+    along = [pose[0] for pose in base_lattice(region, own, 1.0, around_bin=False)]
+    assert min(along) < 0.15
+    assert max(along) > 2.85
+    assert own[0] in along
+    around = [pose[0] for pose in base_lattice(region, own, 1.0)]
+    assert max(around) <= 1.0
 
 
 def test_smoothing_prefers_the_middle_of_a_plateau():

@@ -66,10 +66,21 @@ def base_region(
     return Region(low=low, high=high, period_rad=2.0 * np.pi)
 
 
-def base_lattice(region: Region, own: Pose, reach: float) -> list[Pose]:
-    """Poses at even distances, those from which the bin is out of reach left out.
+def base_lattice(
+    region: Region, own: Pose, reach: float, *, around_bin: bool = True
+) -> list[Pose]:
+    """Poses at even distances.
 
     The lattice has the present place among its points where the region allows.
+
+    Parameters
+    ----------
+    region : Region
+    own : pose
+    reach : float
+        Distances are a share of it [m].
+    around_bin : bool
+        Leave out places from which the bin, at the origin, is out of reach.
     """
     step = max(reach / STEPS_IN_REACH, LEAST_STEP_M)
     axes = [
@@ -78,7 +89,7 @@ def base_lattice(region: Region, own: Pose, reach: float) -> list[Pose]:
     ]
     found = []
     for x, y, z in itertools.product(*axes):
-        if np.linalg.norm([x, y, z]) <= reach:
+        if not around_bin or np.linalg.norm([x, y, z]) <= reach:
             yaw = facing(region, own, x, y)
             found.append((x, y, z, yaw))
     return found

@@ -92,10 +92,6 @@ class RailMounting:
 
     name: str
 
-    def T_level_base(self, pose: Pose) -> FloatArray:  # noqa: N802
-        """Along x, so that distances are those on the rail."""
-        return yaw_transform(*pose)
-
     def cell_at(self, loaded: LoadedCell, pose: Pose) -> LoadedCell:
         """The cell with the joint locked there."""
         return with_joint_at(loaded, self.name, round(pose[0], 9))

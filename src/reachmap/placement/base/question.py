@@ -99,6 +99,9 @@ class BaseQuestion:
 
     def is_possible(self, pose: Pose, q: FloatArray) -> bool:
         """Whether the arm can be at a configuration with its base at a pose."""
+        # A rail ends where it ends; elsewhere the region is only where to look.
+        if self.fit is None and self.region.outside(np.array(pose)):
+            return False
         if self.contact(pose):
             return False
         try:

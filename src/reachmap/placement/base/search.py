@@ -92,7 +92,9 @@ def _finalists(
     question: BaseQuestion, reach: float, top: int, decision: Decision
 ) -> list[Pose]:
     """Best places by their bounds, far from each other; all go into the table."""
-    poses = base_lattice(question.region, question.own, reach)
+    # x of an arm on a rail is no distance from the bin.
+    is_free = question.fit is not None
+    poses = base_lattice(question.region, question.own, reach, around_bin=is_free)
     reasons = [question.reason_against(pose) for pose in poses]
     free = [pose for pose, reason in zip(poses, reasons, strict=True) if not reason]
     question.evaluator.expect(len(free) + top + REFINE_POSES + SETTLING)
