@@ -36,7 +36,9 @@ def verdict_text(evidence: EvidenceSummary) -> str:
     if evidence.checks is None or not evidence.frames:
         return text
     agreed = f"{evidence.agreed} of {plural(evidence.frames, 'frame')}"
-    return f"{text}; an independent method agrees on {agreed}"
+    sure = evidence.confidence
+    least = "" if sure is None else f"; confidence {100 * sure:.0f} % or more"
+    return f"{text}; an independent method agrees on {agreed}{least}"
 
 
 def cause_lines(causes: Causes) -> list[str]:

@@ -16,7 +16,11 @@ from reachmap.runtime.options import RunOptions
 from reachmap.runtime.progress import Progress
 
 # Six points, all around; nothing of the approach but the branches of the kinematics.
-SMALL = ("bin_scan.grid=[3,2]", "bin_scan.approach_distance_m=0.02")
+SMALL = (
+    "bin_scan.grid=[3,2]",
+    "bin_scan.approach_distance_m=0.02",
+    "tool.roll=listed",
+)
 EVERY = (3, 2, 1)
 POSE = (0.45, 0.05, 0.0, 1.3)
 

@@ -41,7 +41,13 @@ FEW = [
         ("roll_offset_deg", "30" if scan == "workspace_scan" else "120"),
     )
 ]
-UR5 = [*UR5_CUBES, *FEW, "workspace_scan.z_step=0.2", "bin_scan.grid=[4,3]"]
+UR5 = [
+    *UR5_CUBES,
+    *FEW,
+    "workspace_scan.z_step=0.2",
+    "bin_scan.grid=[4,3]",
+    "tool.roll=listed",
+]
 TOY = [
     'workspace_scan.cubes=[{"name":"all","min":[-0.6,-0.6,0],"max":[0.6,0.6,0],'
     '"grid":[7,7]}]',

@@ -23,6 +23,7 @@ from reachmap.placement.predicted.prediction import footprint_of
 from tests.support.scenes import scene_of
 
 UR5 = "ur5-eye-in-hand"
+LISTED = "tool.roll=listed"
 
 
 @given(count=st.integers(1, 60), wanted=st.integers(1, 70))
@@ -63,7 +64,7 @@ def everything_open(cell):
 
 def test_the_full_grid_is_every_test_grasp():
     """All points and all orientations: nothing is left to estimate."""
-    cell = read_cell(UR5).cell
+    cell = read_cell(UR5, [LISTED]).cell
     sample = sample_of(cell, (20, 14, 1), everything_open(cell))
     frames = frames_in_bin(cell)
     assert len(sample.share) == cell.bin_scan.count() == 7560
@@ -75,7 +76,7 @@ def test_the_full_grid_is_every_test_grasp():
 @pytest.mark.parametrize("grid", [COARSE, (6, 5, 3), (5, 4, 1), (20, 14, 2)])
 def test_shares_and_weights_add_up(grid):
     """Shares add up to 1, weights to the share of frames that the tool can take."""
-    cell = read_cell(UR5).cell
+    cell = read_cell(UR5, [LISTED]).cell
     is_open = np.random.default_rng(2).random(frames_in_bin(cell).shape) < 0.8
     sample = sample_of(cell, grid, is_open)
     assert sample.share.sum() == pytest.approx(1.0)
@@ -88,7 +89,7 @@ def test_shares_and_weights_add_up(grid):
 
 def test_neighbours_have_other_orientations():
     """A point and its neighbour share no orientation, three in a row have all."""
-    cell = read_cell(UR5).cell
+    cell = read_cell(UR5, [LISTED]).cell
     sample = sample_of(cell, COARSE, everything_open(cell))
     used = [
         {T[:3, :3].round(6).tobytes() for T in sample.T_bin_tcp[sample.point == p]}
@@ -107,7 +108,7 @@ def test_few_orientations_are_all_used():
 
 def test_many_layers_are_thinned():
     """Of many layers the lowest, the middle and the highest are kept."""
-    cell = read_cell(UR5, ["bin_scan.layers=[0.01,0.02,0.03,0.04,0.05]"]).cell
+    cell = read_cell(UR5, [LISTED, "bin_scan.layers=[0.01,0.02,0.03,0.04,0.05]"]).cell
     heights = np.unique(frames_in_bin(cell).points[..., 2])
     assert heights.tolist() == [0.01, 0.03, 0.05]
     sample = sample_of(cell, COARSE, everything_open(cell))
@@ -117,7 +118,7 @@ def test_many_layers_are_thinned():
 
 def test_an_estimate_is_near_the_whole_where_reach_is_smooth():
     """A reach that falls off smoothly is estimated well from 6 % of the frames."""
-    cell = read_cell(UR5).cell
+    cell = read_cell(UR5, [LISTED]).cell
     frames = frames_in_bin(cell)
     is_open = everything_open(cell)
     is_open[:, :2, :, ::2] = False
@@ -136,7 +137,7 @@ def test_an_estimate_is_near_the_whole_where_reach_is_smooth():
 
 def test_the_worst_point_against_a_loop():
     """Least share over points, of all frames where all are looked at."""
-    cell = read_cell(UR5).cell
+    cell = read_cell(UR5, [LISTED]).cell
     rng = np.random.default_rng(8)
     is_open = rng.random(frames_in_bin(cell).shape) < 0.9
     sample = sample_of(cell, (20, 14, 1), is_open)
@@ -150,7 +151,7 @@ def test_the_worst_point_against_a_loop():
 
 def test_nothing_open_is_a_score_of_zero():
     """A tool that fits nowhere has weights of 0 and a worst point of 0."""
-    cell = read_cell(UR5).cell
+    cell = read_cell(UR5, [LISTED]).cell
     sample = sample_of(cell, COARSE, ~everything_open(cell))
     assert not sample.weight.any()
     assert sample.worst_point(np.ones(len(sample.share), bool)) == 0.0
@@ -159,7 +160,7 @@ def test_nothing_open_is_a_score_of_zero():
 def test_closed_frames_collide_in_the_whole_scene():
     """Where the tool alone is said to touch the bin, every configuration collides."""
     overrides = ("bin_scan.grid=[6,5]",)
-    scene = scene_of(UR5, *overrides)
+    scene = scene_of(UR5, LISTED, *overrides)
     is_open = open_frames(scene.robot, scene.loaded).ravel()
     T = scene.T_base_bin @ frames_in_bin(scene.loaded.cell).transforms().reshape(
         -1, 4, 4
@@ -174,7 +175,7 @@ def test_closed_frames_collide_in_the_whole_scene():
 
 def test_a_footprint_averages_what_is_open_around_its_points():
     """Each point of the footprint stands for its tile, frame by frame."""
-    cell = read_cell(UR5).cell
+    cell = read_cell(UR5, [LISTED]).cell
     is_open = np.random.default_rng(4).random((1, 14, 20, 27)) < 0.7
     footprint = footprint_of(cell, is_open)
     assert footprint.weights.sum() == pytest.approx(1.0)
@@ -193,7 +194,7 @@ def test_where_the_roll_is_free_a_direction_counts_with_any_roll():
     loaded = scene.loaded
     rolls = rolls_of(loaded.cell)
     assert len(rolls) == MOST_ROLLS
-    listed = frames_in_bin(scene_of("ur5-eye-in-hand", with_bin=False).loaded.cell)
+    listed = frames_in_bin(scene_of(UR5, LISTED, with_bin=False).loaded.cell)
     free = frames_in_bin(loaded.cell)
     down = np.unique(np.round(listed.orientations[:, :, 2], 6), axis=0)
     assert free.shape[-1] == len(down) < listed.shape[-1]

@@ -11,12 +11,13 @@ from tests.support.optional import present
 from tests.support.scenes import scene_of
 
 UR5 = "ur5-eye-in-hand"
+LISTED = "tool.roll=listed"
 DEEP = ("bin.inner=[0.36,0.26,0.12]", "bin_scan.grid=[5,4]", "bin_scan.layers=[0.03]")
 
 
 def limit_of(*overrides):
     """The limit of a cell, and the share of test grasps its tool can take."""
-    scene = scene_of(UR5, *DEEP, *overrides, with_bin=False)
+    scene = scene_of(UR5, LISTED, *DEEP, *overrides, with_bin=False)
     is_open = open_frames(scene.robot, scene.loaded)
     return tool_limit(scene.robot, scene.loaded, is_open), 100 * float(is_open.mean())
 
@@ -25,7 +26,7 @@ def test_a_longer_tube_gives_what_a_cell_with_one_has():
     """Tube, and TCP with it, 20 mm longer in the cell file itself."""
     limit, share = limit_of()
     assert limit.percent == pytest.approx(share)
-    cell = scene_of(UR5, *DEEP, with_bin=False).loaded.cell
+    cell = scene_of(UR5, LISTED, *DEEP, with_bin=False).loaded.cell
     tube = next(body for body in cell.bodies if body.name == "suction tube")
     index = cell.bodies.index(tube)
     length, z = present(tube.shape.cylinder).length, tube.pose.xyz[2]
@@ -60,7 +61,11 @@ def test_the_best_dimension_comes_first():
 def test_a_tool_that_loses_nothing_has_no_limit():
     """Far above a flat tray every grasp is open."""
     scene = scene_of(
-        UR5, "bin.inner=[0.36,0.26,0.01]", "bin_scan.layers=[0.4]", with_bin=False
+        UR5,
+        LISTED,
+        "bin.inner=[0.36,0.26,0.01]",
+        "bin_scan.layers=[0.4]",
+        with_bin=False,
     )
     is_open = np.ones((1, 14, 20, 27), bool)
     limit = tool_limit(scene.robot, scene.loaded, is_open)

@@ -218,7 +218,8 @@ def test_a_map_without_paths_has_nothing_to_keep(tmp_path):
 @pytest.mark.slow
 def test_two_hundred_perturbed_cells(tmp_path):
     """No certified grasp fails; the predicted yield is that of cells never seen."""
-    cell, overrides = "ur5-eye-in-hand", ("bin_scan.grid=[4,3]", "bin_scan.repeats=1")
+    cell = "ur5-eye-in-hand"
+    overrides = ("bin_scan.grid=[4,3]", "bin_scan.repeats=1", "tool.roll=listed")
     record = bin_scan(None, tmp_path / "bin.h5", cell=cell, overrides=overrides)
     found = robust(tmp_path / "bin.h5", tmp_path / "r.h5", errors=SIZES)
     given = found.scale.tolist().index(1.0)

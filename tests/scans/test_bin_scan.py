@@ -14,7 +14,8 @@ from reachmap.tools.merge import merge
 from tests.support.dense_checks import dense_free
 from tests.support.scenes import scene_of
 
-UR5_FEW = ("bin_scan.grid=[3,2]", "bin_scan.repeats=2")
+# In the listed rolls, so that paths end at the test grasps themselves.
+UR5_FEW = ("bin_scan.grid=[3,2]", "bin_scan.repeats=2", "tool.roll=listed")
 TOY = ("bin_scan.repeats=2", "planner.max_checks=300")
 
 

@@ -77,6 +77,8 @@ class Components:
     method_checks : int array, shape (components, methods)
         State checks by each method; they add up to ``checks``.
     methods : tuple of str
+    confidence : array, shape (components,), or None
+        See :func:`reachmap.maps.confidence.confidence_of`.
     """
 
     attempts: IntArray
@@ -85,6 +87,7 @@ class Components:
     agreed: CodeArray
     method_checks: IntArray
     methods: tuple[str, ...]
+    confidence: FloatArray | None = None
 
     def __post_init__(self) -> None:
         freeze(self)

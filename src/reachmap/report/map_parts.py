@@ -273,10 +273,12 @@ def _evidence_paragraph(evidence: EvidenceSummary | None) -> Blocks:
     if evidence is None or not evidence.frames or evidence.checks is None:
         return None
     methods = ", ".join(f"{n} {c:,}" for n, c in evidence.method_checks.items())
+    sure = evidence.confidence
+    least = "" if sure is None else f" Confidence: {100 * sure:.0f} % or more."
     return paragraph(
         f"No path was found to {count(evidence.frames, 'test grasp')} with a free "
         f"goal, after {evidence.checks:,} state checks ({methods}); an independent "
-        f"method agrees on {evidence.agreed} of them."
+        f"method agrees on {evidence.agreed} of them.{least}"
     )
 
 

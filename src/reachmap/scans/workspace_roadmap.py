@@ -13,6 +13,7 @@ from reachmap._typing import FloatArray, IntArray
 from reachmap.core.planning.connection import Connection, connect
 from reachmap.core.scene import Scene
 from reachmap.maps import Status
+from reachmap.maps.confidence import confidence_of
 from reachmap.maps.parts import Components
 from reachmap.runtime.job import Stages, Work
 from reachmap.runtime.journal import UNITS
@@ -173,13 +174,15 @@ def _distinct(
 
 def components_of(connection: Connection) -> Components:
     """Evidence of a connection as artefacts keep it."""
+    checks, reached = connection.checks.sum(axis=1), connection.reached.astype(np.uint8)
     return Components(
         attempts=connection.attempts,
-        checks=connection.checks.sum(axis=1),
-        reached=connection.reached.astype(np.uint8),
+        checks=checks,
+        reached=reached,
         agreed=connection.agreed.astype(np.uint8),
         method_checks=connection.checks,
         methods=connection.methods,
+        confidence=confidence_of(checks, reached),
     )
 
 

@@ -7,6 +7,7 @@ import pytest
 from scipy import stats
 
 from reachmap.geometry import rotation_from_quaternion_wxyz
+from reachmap.maps.confidence import confidence_of
 from reachmap.maps.records import Status
 from reachmap.maps.summary.directions import (
     direction_percent,
@@ -133,3 +134,12 @@ def test_evidence_counts_each_component_once() -> None:
     assert found.checks == int(components.checks[1:].sum())
     assert sum(found.method_checks.values()) == found.checks
     assert found.agreed == 2  # the frames of component 1
+    sure = confidence_of(components.checks, components.reached)
+    assert found.confidence == sure[1:].min()
+
+
+def test_confidence_is_the_share_that_was_reached_with_no_more_checks() -> None:
+    """It grows with the checks, never says certain, and needs none for a path."""
+    checks = np.array([0, 3_500, 20_000, 10**9, 5], np.int32)
+    found = confidence_of(checks, np.array([0, 0, 0, 0, 1], np.uint8))
+    np.testing.assert_allclose(found, [0, 0.4, 0.89, 0.99, 1])

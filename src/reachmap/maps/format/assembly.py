@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Container, Iterable, Mapping, Sequence
-from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
@@ -230,7 +229,7 @@ def section_arrays(
     lists: dict[str, Sequence[str]] = {}
     numbers: dict[str, float] = {}
     for section in layout.sections:
-        part = attrgetter(section.field)(record) if section.field else None
+        part = _part(record, section.field)
         if part is None:
             continue
         for name, variable in section.arrays.items():
@@ -238,6 +237,14 @@ def section_arrays(
         lists.update({label: getattr(part, n) for n, label in section.lists.items()})
         numbers.update({key: getattr(part, n) for n, key in section.numbers.items()})
     return arrays, lists, numbers
+
+
+def _part(record: Any, field: str) -> Any:
+    """A field of a record, or of a field of it; None where either is not there."""
+    owner, _, name = field.rpartition(".")
+    if owner:
+        record = getattr(record, owner)
+    return getattr(record, name) if name and record is not None else None
 
 
 def sections_of(layout: Layout, tree: Tree) -> dict[str, Any]:
@@ -259,7 +266,11 @@ def sections_of(layout: Layout, tree: Tree) -> dict[str, Any]:
         for name, key in section.numbers.items():
             values[name] = float(attributes[key])
         only = next(iter(values.values()))
-        fields[section.field] = section.part(**values) if section.part else only
+        owner, _, own = section.field.rpartition(".")
+        if owner in fields:
+            fields[owner] = dataclasses.replace(fields[owner], **{own: only})
+        else:
+            fields[section.field] = section.part(**values) if section.part else only
     return fields
 
 

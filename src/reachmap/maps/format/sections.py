@@ -99,6 +99,20 @@ COMPONENTS = Section(
     },
 )
 
+CONFIDENCE = Section(
+    field="components.confidence",
+    arrays={
+        "confidence": _component(
+            "confidence",
+            "f8",
+            "Share of the reachable components of the calibration that were reached "
+            "with no more checks; 1 where this one is.",
+            low=0,
+            high=1,
+        )
+    },
+)
+
 COMPONENT = Section(
     field="component",
     arrays={
@@ -329,11 +343,12 @@ STAGE_OF_PATH = Section(
 )
 
 BIN_SECTIONS = (
-    COMPONENT, COMPONENTS, ROLLS, WINNING_ROLL, EFFORT, BEST, TIMES, MARGINS, CYCLE,
-    STAGE_OF_PATH, world(),
+    COMPONENT, COMPONENTS, CONFIDENCE, ROLLS, WINNING_ROLL, EFFORT, BEST, TIMES,
+    MARGINS, CYCLE, STAGE_OF_PATH, world(),
 )  # fmt: skip
 WORKSPACE_SECTIONS = (
     COMPONENTS,
+    CONFIDENCE,
     world(with_scales=True),
     _pose("T_base_grid", "Frame of x, y, z in robot_base", "robot_base"),
 )

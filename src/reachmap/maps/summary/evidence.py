@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from reachmap._typing import CodeArray, IntArray
+from reachmap.maps.confidence import confidence_of
 from reachmap.maps.parts import Components
 from reachmap.maps.records import Status
 
@@ -30,6 +31,9 @@ class EvidenceSummary:
         The same by method, without methods that were not needed.
     agreed : int
         Frames whose verdict an independent method confirmed.
+    confidence : float or None
+        Least of the components, see :func:`reachmap.maps.confidence.confidence_of`;
+        None without components.
     """
 
     frames: int
@@ -38,6 +42,7 @@ class EvidenceSummary:
     checks: int | None
     method_checks: dict[str, int]
     agreed: int
+    confidence: float | None
 
 
 def evidence_of(
@@ -72,8 +77,10 @@ def evidence_of(
             checks=None,
             method_checks={},
             agreed=0,
+            confidence=None,
         )
     by_method = components.method_checks[labels].sum(axis=0).tolist()
+    sure = confidence_of(components.checks, components.reached)[labels]
     named = zip(components.methods, by_method, strict=True)
     return EvidenceSummary(
         frames=len(component),
@@ -82,6 +89,7 @@ def evidence_of(
         checks=int(components.checks[labels].sum()),
         method_checks={name: int(count) for name, count in named if count},
         agreed=int((components.agreed[component[~alone]] == 1).sum()),
+        confidence=float(sure.min()) if len(sure) else None,
     )
 
 
