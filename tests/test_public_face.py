@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import subprocess
 import sys
 
@@ -39,3 +40,16 @@ def test_importing_the_package_loads_nothing() -> None:
         [sys.executable, "-c", code], check=True, capture_output=True, text=True
     )
     assert done.stdout.splitlines() == ["[]", "[]"]
+
+
+def test_paths_may_be_text_everywhere() -> None:
+    """Whoever writes a script has names, not Path objects."""
+    strict = [
+        f"{name}({parameter.name}: {parameter.annotation})"
+        for name in reachmap.__all__
+        if inspect.isfunction(tool := getattr(reachmap, name))
+        for parameter in inspect.signature(tool).parameters.values()
+        if "Path" in str(parameter.annotation)
+        and "str" not in str(parameter.annotation)
+    ]
+    assert not strict

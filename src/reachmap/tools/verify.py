@@ -75,7 +75,7 @@ class Verification:
             raise MapFileError(problems)
 
 
-def verify(paths: Sequence[Path]) -> Verification:
+def verify(paths: Sequence[str | Path]) -> Verification:
     """Check files for damage, and against the contract of their kind.
 
     Every byte is read, so that the checksums of HDF5 are compared; the hashes over

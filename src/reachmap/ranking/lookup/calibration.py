@@ -16,6 +16,7 @@ from typing import Any, Final
 import numpy as np
 
 from reachmap._typing import FloatArray
+from reachmap.disk import is_there
 from reachmap.errors import MapFileError
 from reachmap.maps.parts import freeze
 from reachmap.maps.records import Stamp
@@ -90,7 +91,7 @@ def usual_calibration(map_path: str | Path, stamp: Stamp) -> Calibration | None:
     passed over with a warning.
     """
     path = calibration_beside(map_path)
-    if not path.exists():
+    if not is_there(path):
         return None
     try:
         return read_calibration(path, stamp.content_sha256)
