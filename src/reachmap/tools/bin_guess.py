@@ -29,6 +29,8 @@ MOST = 24
 # Height that an arm gets above with most of its configurations, as a quantile.
 LOW = 0.1
 THIN = 3
+# As a share of the reach: the size of a bin, and of the gaps between random poses.
+NEAR = 0.35
 POINTS = np.array([[0.0, 0.0], [-0.3, -0.3], [0.3, -0.3], [-0.3, 0.3], [0.3, 0.3]])
 
 
@@ -64,7 +66,9 @@ class BinGuess:
     avoided: str
 
 
-def guess_bin(scene: Scene, points: FloatArray, *, with_tool: bool) -> BinGuess | None:
+def guess_bin(
+    scene: Scene, T_base_tcp: FloatArray, *, with_tool: bool
+) -> BinGuess | None:
     """First place for the bin that is clear and that the arm picks from.
 
     In front at the base's height if it fits there; else nearer, farther, at another
@@ -75,15 +79,18 @@ def guess_bin(scene: Scene, points: FloatArray, *, with_tool: bool) -> BinGuess 
     ----------
     scene : Scene
         Built with ``bin_moves``, its TCP at the tip; not to be used any more.
-    points : array, shape (n, 3)
-        Where the TCP gets, in robot_base [m].
+    T_base_tcp : array, shape (n, 4, 4)
+        Poses of random configurations. Places that none of them comes near with its
+        tool pointing down are passed over.
     with_tool : bool
         Whether the TCP may be put beyond the tip, as if on a tool.
     """
     fit = BinFit(scene.robot, scene.loaded, None)
     avoided = ""
     trials: list[_Trial] = []
-    for xyz_m, yaw_deg in _places(points):
+    places = list(_places(T_base_tcp[:, :3, 3]))
+    near = [place for place in places if _comes_near(scene, T_base_tcp, place[0])]
+    for xyz_m, yaw_deg in near or places:
         contact = fit.contact(yaw_transform(*xyz_m, np.radians(yaw_deg)))
         if contact is None:
             trials.append(_Trial(scene, xyz_m, yaw_deg))
@@ -187,6 +194,14 @@ def _free(scene: Scene, T_base_tip: FloatArray) -> BoolArray:
     """Whether a free configuration meets a pose, (n, 4, 4) to (n,)."""
     _, frame, free = _solutions(scene, T_base_tip)
     return np.isin(np.arange(len(T_base_tip)), frame[free])
+
+
+def _comes_near(scene: Scene, T_base_tcp: FloatArray, xyz_m: Place) -> bool:
+    """Whether some pose is near a place and points down rather than up."""
+    axis, sign = AXES[scene.loaded.cell.robot.tcp.approach_axis]
+    apart_m = np.linalg.norm(T_base_tcp[:, :3, 3] - xyz_m, axis=1)
+    near = apart_m < NEAR * reach_of(T_base_tcp[:, :3, 3])
+    return bool((near & (-sign * T_base_tcp[:, 2, axis] > 0.0)).any())
 
 
 def _places(points: FloatArray) -> Iterator[tuple[Place, float]]:

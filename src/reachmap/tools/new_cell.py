@@ -269,14 +269,14 @@ class _Attempt:
 
     def _with_bin(self, scene: Scene, Q: FloatArray) -> Scene:
         """Put the bin where it is clear of what stands still, and picked from."""
-        tip, points = self.choices.tip, scene.kinematics.forward_many(Q)[:, :3, 3]
+        tip, T_base_tcp = self.choices.tip, scene.kinematics.forward_many(Q)
         best: BinGuess | None = None
         choices = self.choices
         for inner_m in BINS_M:
             self.choices = replace(choices, bin_inner_m=inner_m)
             guess = guess_bin(
                 Scene.build(self._loaded(), bin_moves=True),
-                points,
+                T_base_tcp,
                 with_tool=not is_tool_point(tip),
             )
             if guess is not None and (best is None or guess.share > best.share):
@@ -333,7 +333,9 @@ class _Attempt:
 def _words(guess: BinGuess, tip: str) -> list[str]:
     """What is unusual about the bin and the tool that were guessed."""
     if not guess.share:
-        return [f"no grasp in the bin is met, wherever it is put: {guess.why}"]
+        return [
+            f"no grasp in the bin is met at the places that were tried: {guess.why}"
+        ]
     notes = []
     few = "few grasps are met"
     if guess.odd_place:
