@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from jsonschema import Draft202012Validator
+from scipy.spatial.transform import Rotation
 
 from reachmap.errors import SettingsError
 from reachmap.maps import write_bin_map
@@ -16,12 +17,33 @@ from reachmap.maps.cycle.seconds import throughput_of
 from reachmap.maps.parts import StageStatus
 from reachmap.ranking import Ranker
 from reachmap.ranking.lookup.order import status_name
+from reachmap.ranking.lookup.queries import queries_from_arrays
+from reachmap.ranking.lookup.surroundings import Surroundings
 from reachmap.tools.schema import schema
 from tests.support.command_line import reachmap
 from tests.support.cycle_maps import WAITS_S, with_cycles
 from tests.support.ranking_maps import make_bin_map
 
 DOWN = np.array([[0.0, 0.0, -1.0]])
+
+
+def shares_whole(bin_map: Any, ranker: Ranker, grasps: np.ndarray) -> np.ndarray:
+    """Share of what is reached around test grasps that has a whole cycle.
+
+    From two maps: one as it is, and one where nothing else counts as reached.
+    """
+    queries = queries_from_arrays(
+        ranker.table,
+        bin_map.position[tuple(grasps[:, :3].T)],
+        rotations=Rotation.from_quat(
+            bin_map.quaternion_wxyz[tuple(grasps.T)], scalar_first=True
+        ).as_matrix(),
+        roll="fixed",
+    )
+    whole = np.isfinite(bin_map.cycle.cycle_time).reshape(ranker.table.reachable.shape)
+    table = dataclasses.replace(ranker.table, reachable=whole)
+    near = Surroundings(table).share_reached(queries)
+    return np.minimum(near / ranker.surroundings.share_reached(queries), 1.0)
 
 
 def test_seconds_of_a_pick_by_hand():
@@ -36,6 +58,7 @@ def test_seconds_of_a_pick_by_hand():
         failure_cost_s=7.0,
         roll="fixed",
     )
+    share = shares_whole(bin_map, ranker, grasps)
     for row, place in enumerate(map(tuple, grasps.tolist())):
         cycle_s = bin_map.cycle.cycle_time[place]
         if np.isnan(cycle_s):
@@ -47,7 +70,7 @@ def test_seconds_of_a_pick_by_hand():
         if not found.any():
             checks = np.array([bin_map.best.effort_checks[place]])
         planning_s = checks.mean() * bin_map.effort.seconds_per_check
-        failing_s = 7.0 * (1 - ranking.probability[row])
+        failing_s = 7.0 * (1 - ranking.probability[row] * share[row])
         terms = dict(zip(ranking.term_names, ranking.terms[row], strict=True))
         assert ranking.cost[row] == pytest.approx(cycle_s + planning_s + failing_s)
         assert terms["to_grasp_s"] == pytest.approx(bin_map.best.execution_time[place])

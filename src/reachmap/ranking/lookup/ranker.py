@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 
@@ -97,6 +98,12 @@ class Ranker:
         self.calibration = calibration
         self.table: GraspTable = table_from_bin_map(bin_map, basis)
         self.surroundings = Surroundings(self.table)
+        cycle = self.table.cycle
+        self._whole_around = (
+            None
+            if cycle is None
+            else Surroundings(replace(self.table, reachable=cycle.whole))
+        )
         self.frames: Mapping[str, FloatArray] = frames_of(bin_map)
         self.stamp: Stamp = bin_map.stamp
         self._tree = NearestPoints(self.table.points)
@@ -218,7 +225,8 @@ class Ranker:
         unlike = unlike_map(matches, queries.free, table, settings.max_angle_deg)
         probability = self._probability(queries)
         if settings.cost == "cycle":
-            names, terms = self._seconds(matches, columns, settings, probability)
+            whole = probability * self._share_whole(queries)
+            names, terms = self._seconds(matches, columns, settings, whole)
         else:
             names, terms = self._terms(queries, matches, columns, settings)
         matched = queries.valid & ~outside & ~unlike
@@ -249,6 +257,13 @@ class Ranker:
     def _probability(self, queries: Queries) -> FloatArray:
         share = self.surroundings.share_reached(queries)
         return share if self.calibration is None else self.calibration(share)
+
+    def _share_whole(self, queries: Queries) -> FloatArray:
+        """Share of what is reached around each grasp that has a whole cycle, (n,)."""
+        assert self._whole_around is not None
+        whole = self._whole_around.share_reached(queries)
+        reached = self.surroundings.share_reached(queries)
+        return np.minimum(whole / np.maximum(reached, 1e-9), 1.0)
 
     def tied(self, query: Queries) -> tuple[IntArray, IntArray]:
         """Points and orientations of the test grasps that tie for one grasp."""
