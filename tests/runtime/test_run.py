@@ -20,11 +20,13 @@ from reachmap.errors import (
 )
 from reachmap.maps import RunClock
 from reachmap.maps.records import RunInfo, Status
+from reachmap.runtime.executors import open_pool
 from reachmap.runtime.job import Job
 from reachmap.runtime.journal import read_store
 from reachmap.runtime.options import RunOptions
+from reachmap.runtime.progress import Progress
 from reachmap.runtime.results import Results, preview
-from reachmap.runtime.run import run_scan, run_units
+from reachmap.runtime.run import compute, run_scan, run_units
 from reachmap.runtime.signals import STOP_SIGNALS
 from reachmap.runtime.store import store_path
 from tests.support import toy_work
@@ -318,3 +320,23 @@ def test_stages_are_kept_too(output):
 def double(context, unit):
     """Twice the sum of a unit."""
     return 2 * sum(unit)
+
+
+def test_a_pool_gets_ready_for_a_job_once():
+    """Rounds of one job share what was built for it; another job builds its own."""
+    built.clear()
+    job, other = (Job(function=double, context=[k], prepare=build) for k in (1, 2))
+    with open_pool(RunOptions()) as pool:
+        for this in (job, job, job, other, job):
+            progress = Progress("toy", quiet=True)
+            assert compute(pool, this, [(1, 2)], progress) == [6]
+    assert built == [1, 2, 1]
+
+
+built: list[int] = []
+
+
+def build(context):
+    """Note that something was built."""
+    built.extend(context)
+    return context

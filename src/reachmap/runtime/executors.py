@@ -125,9 +125,9 @@ class InProcessSlot(Slot):
         self._keys: set[str] = set()
 
     def ticket(self, ticket: Ticket) -> Ticket:
-        """Return the ticket without its job, which this process has by now."""
+        """Return the ticket with its job, which jobs within may have pushed out."""
         self._keys.add(ticket.key)
-        return ticket.without_job()
+        return ticket
 
     def stop(self, executor: Executor) -> None:
         """Drop what was built; the process lives on."""

@@ -136,6 +136,7 @@ class Pool:
     def __init__(self, slots_for: Callable[[int, int | None], Sequence[Slot]]) -> None:
         self._slots_for = slots_for
         self._used: dict[int, Slot] = {}
+        self._last: Ticket | None = None
 
     def __enter__(self) -> Pool:
         return self
@@ -176,7 +177,13 @@ class Pool:
             if slot.held or slot.suspects:
                 slot.suspects.clear()
                 slot.let_go()
-        yield from _Round(slots, ticket_for(job), units).replies()
+        yield from _Round(slots, self._ticket(job), units).replies()
+
+    def _ticket(self, job: Job) -> Ticket:
+        """The ticket of a job; workers that are ready for it need not get so again."""
+        if self._last is None or self._last.job is not job:
+            self._last = ticket_for(job)
+        return self._last
 
 
 class _Round:

@@ -85,3 +85,22 @@ def test_an_empty_path_is_followed_at_once(kinematics: Kinematics) -> None:
     path = kinematics.follow(START, np.zeros((0, 4, 4)))
     assert path is not None
     assert path.shape == (0, 6)
+
+
+def test_many_are_followed_as_one_is(kinematics: Kinematics) -> None:
+    """Rows of random starts, met and not met, against one row at a time."""
+    rng = np.random.default_rng(8)
+    robot = kinematics.robot
+    Q = rng.uniform(robot.lower_rad, robot.upper_rad, (200, 6))
+    poses = np.stack(
+        [straight(kinematics.forward(q), np.array([0, 0, -1.0]), 0.05)[5::5] for q in Q]
+    )
+    found, is_met = kinematics.follow_many(Q, poses)
+    alone = [kinematics.follow(q, T) for q, T in zip(Q, poses, strict=True)]
+    assert is_met.tolist() == [path is not None for path in alone]
+    assert 20 < is_met.sum() < 200
+    paths = np.array([path for path in alone if path is not None])
+    np.testing.assert_allclose(found[is_met], paths, atol=2e-4)
+    met = np.flatnonzero(is_met)
+    worst = max(misses(robot, found[k], poses[k]).max() for k in met)
+    assert worst < 2e-6

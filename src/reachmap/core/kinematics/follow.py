@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
-from reachmap._typing import FloatArray
+from reachmap._typing import BoolArray, FloatArray
 from reachmap.core.robot.assembly import TCP_FRAME
+from reachmap.core.robot.chain import SerialChain, pose_error
 from reachmap.core.robot.model import RobotModel
 
 _ITERATIONS = 12
@@ -86,3 +87,76 @@ class Follower:
             if np.abs(q - q_start).max() > largest:
                 return None
         return None
+
+
+def follow_many(
+    robot: RobotModel,
+    chain: SerialChain,
+    Q_start: FloatArray,
+    T: FloatArray,
+    *,
+    tolerance: float,
+    largest_step_rad: float,
+) -> tuple[FloatArray, BoolArray]:
+    """Track many rows of poses at once, each as :meth:`Follower.follow` does.
+
+    Parameters
+    ----------
+    robot : RobotModel
+    chain : SerialChain
+        Of the robot.
+    Q_start : array, shape (n, dof)
+    T : array, shape (n, k, 4, 4)
+    tolerance, largest_step_rad : float
+
+    Returns
+    -------
+    Q : array, shape (n, k, dof)
+    is_met : bool array, shape (n,)
+        Rows that are followed to their end; the others hold no solution.
+    """
+    q, change = np.array(Q_start, float), np.zeros_like(Q_start)
+    found = np.empty((len(q), T.shape[1], q.shape[1]))
+    going = np.arange(len(q))
+    for k in range(T.shape[1]):
+        start = q[going] + change[going]
+        met, fine = _meet_many(chain, start, T[going, k], tolerance, largest_step_rad)
+        fine &= ((met >= robot.lower_rad) & (met <= robot.upper_rad)).all(axis=1)
+        fine &= np.abs(met - q[going]).max(axis=1, initial=0.0) <= largest_step_rad
+        going, met = going[fine], met[fine]
+        if k:
+            change[going] = met - q[going]
+        found[going, k] = q[going] = met
+    is_met = np.zeros(len(q), bool)
+    is_met[going] = True
+    return found, is_met
+
+
+def _meet_many(
+    chain: SerialChain,
+    Q_start: FloatArray,
+    T: FloatArray,
+    tolerance: float,
+    largest: float,
+) -> tuple[FloatArray, BoolArray]:
+    """Newton steps to one pose a row; which of them arrive, (n,)."""
+    q, fine = np.array(Q_start), np.zeros(len(Q_start), bool)
+    going = np.arange(len(q))
+    for _ in range(_ITERATIONS):
+        T_now, J = chain.jacobian_many(q[going])
+        error = pose_error(T[going], T_now)
+        squares = error * error
+        miss = np.maximum(squares[:, :3].sum(axis=1), squares[:, 3:].sum(axis=1))
+        there = miss <= tolerance**2
+        fine[going[there]] = True
+        going, J, error = going[~there], J[~there], error[~there]
+        if not len(going):
+            break
+        normal = np.swapaxes(J, 1, 2) @ J
+        damping = 1e-2 * (error * error).sum(axis=1) + 1e-12
+        normal[:, range(q.shape[1]), range(q.shape[1])] += damping[:, None]
+        right = np.swapaxes(J, 1, 2) @ error[:, :, None]
+        q[going] += np.linalg.solve(normal, right)[..., 0]
+        near = np.abs(q[going] - Q_start[going]).max(axis=1) <= largest
+        going = going[near]
+    return q, fine

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
-from reachmap._typing import FloatArray, IntArray
+from reachmap._typing import BoolArray, FloatArray, IntArray
 from reachmap.cell.model.cell import IkSpec
 from reachmap.core.kinematics.any_roll import AnyRollSolver, has_own_roll
-from reachmap.core.kinematics.follow import Follower
+from reachmap.core.kinematics.follow import Follower, follow_many
 from reachmap.core.kinematics.solutions import within_limits
 from reachmap.core.kinematics.solvers.arm import Arm, BranchSolver
 from reachmap.core.kinematics.solvers.choice import choose_solver
@@ -162,6 +162,31 @@ class Kinematics:
             self.robot.is_revolute,
             windings=windings,
             near=near,
+        )
+
+    def follow_many(
+        self, Q_start: FloatArray, T: FloatArray, *, largest_step_rad: float = 0.2
+    ) -> tuple[FloatArray, BoolArray]:
+        """:meth:`follow` for many rows at once, in a fraction of the time.
+
+        Parameters
+        ----------
+        Q_start : array, shape (n, dof)
+        T : array, shape (n, k, 4, 4)
+        largest_step_rad : float
+
+        Returns
+        -------
+        Q : array, shape (n, k, dof)
+        is_met : bool array, shape (n,)
+        """
+        return follow_many(
+            self.robot,
+            self.chain,
+            Q_start,
+            T,
+            tolerance=self.tolerance,
+            largest_step_rad=largest_step_rad,
         )
 
     def follow(

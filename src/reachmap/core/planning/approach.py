@@ -73,6 +73,20 @@ class StraightApproach:
             back = self._in_smaller_steps(T_base_tcp, q_grasp)
         return None if back is None else np.vstack([back[::-1], q_grasp])
 
+    def of_many(self, T_base_tcp: FloatArray, Q: FloatArray) -> list[FloatArray | None]:
+        """:meth:`of` for many grasps at once, (n, 4, 4) and (n, dof)."""
+        if not len(self._retreats) or not len(Q):
+            return [q[None] for q in Q]
+        T = T_base_tcp[:, None] @ self._retreats
+        back, is_met = self._kinematics.follow_many(
+            Q, T, largest_step_rad=_LARGEST_STEP_RAD
+        )
+        ways: list[FloatArray | None] = []
+        for k, q in enumerate(Q):
+            way = back[k] if is_met[k] else self._in_smaller_steps(T_base_tcp[k], q)
+            ways.append(None if way is None else np.vstack([way[::-1], q]))
+        return ways
+
     def _in_smaller_steps(
         self, T_base_tcp: FloatArray, q_grasp: FloatArray
     ) -> FloatArray | None:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from reachmap._typing import FloatArray, IntArray
+from reachmap._typing import BoolArray, FloatArray, IntArray
 from reachmap.cell.model.cell import Cell
 from reachmap.cell.model.roadmap import RoadmapSpec
 from reachmap.core.planning.approach import StraightApproach
@@ -226,14 +226,14 @@ class PlacedScene:
         branches = np.diff(self._begin)
         # Those with few branches first: too low a bound shows sooner.
         order = np.argsort(branches, kind="stable")
-        for k in order[np.searchsorted(branches[order], 1) :]:
-            while goals.tried[k] < self._begin[k + 1]:
-                if self._try_next(goals, int(k)):
-                    break
-            else:
-                goals.bound -= 100.0 * float(self._sample.weight[k])
-                if goals.bound <= above:
-                    break
+        pending = order[np.searchsorted(branches[order], 1) :]
+        while len(pending):
+            missed = pending[~self._try_next(goals, pending)]
+            ended = goals.tried[missed] == self._begin[missed + 1]
+            goals.bound -= 100.0 * float(self._sample.weight[missed[ended]].sum())
+            if goals.bound <= above:
+                break
+            pending = missed[~ended]
         return goals
 
     def _with_other_branches(self, first: _Goals, connection: Connection) -> _Goals:
@@ -241,21 +241,24 @@ class PlacedScene:
         every = first.copy()
         missed = np.ones(len(self.T), bool)
         missed[connection.roadmap.frames_reached()] = False
-        for k in np.flatnonzero(missed):
-            while every.tried[k] < self._begin[k + 1]:
-                self._try_next(every, int(k))
+        pending = np.flatnonzero(missed)
+        while len(pending := pending[every.tried[pending] < self._begin[pending + 1]]):
+            self._try_next(every, pending)
         return every
 
-    def _try_next(self, goals: _Goals, k: int) -> bool:
-        """Look at the next branch of a frame; True if its approach is free."""
-        row = int(goals.tried[k])
-        goals.tried[k] += 1
-        way = self._approach.of(self._rolled[self._row[row]], self.Q[row])
-        if way is None or (len(way) > 1 and not self._approach.is_free(way)):
-            return False
-        goals.way.append(way)
-        goals.frame.append(k)
-        return True
+    def _try_next(self, goals: _Goals, frames: IntArray) -> BoolArray:
+        """Look at the next branch of some frames; True where its approach is free."""
+        rows = goals.tried[frames]
+        goals.tried[frames] += 1
+        ways = self._approach.of_many(self._rolled[self._row[rows]], self.Q[rows])
+        free = np.zeros(len(frames), bool)
+        for k, (frame, way) in enumerate(zip(frames.tolist(), ways, strict=True)):
+            if way is None or (len(way) > 1 and not self._approach.is_free(way)):
+                continue
+            free[k] = True
+            goals.way.append(way)
+            goals.frame.append(frame)
+        return free
 
     def _connect(self, q: FloatArray, goals: _Goals) -> Connection:
         cell = self.scene.loaded.cell
