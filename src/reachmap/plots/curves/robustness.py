@@ -41,7 +41,7 @@ def draw_robustness(record: Robustness) -> Figure:
     lines = (
         ("reachability", "stay reachable, mean", BIN_COLOUR, "o", "-"),
         ("always", "stay reachable in every cell", "#7b1fa2", "s", "--"),
-        ("certified", "certified: no error of this size can end them", INK, "^", ":"),
+        ("certified", "certified: no such error ends them", INK, "^", ":"),
     )
     for name, words, colour, marker, style in lines:
         axes.plot(
@@ -52,6 +52,7 @@ def draw_robustness(record: Robustness) -> Figure:
             linestyle=style,
             linewidth=1.6,
             markersize=5,
+            clip_on=False,
             label=words,
         )
     axes.axvline(1.0, color=MUTED, linewidth=1.0)
@@ -68,7 +69,7 @@ def draw_robustness(record: Robustness) -> Figure:
     put_title(
         figure,
         0.85,
-        f"{given.reachability:.1f} % of the test grasps stay reachable, "
+        f"{given.reachability:.1f} % of the test grasps survive, "
         f"{given.certified:.1f} % for certain",
         f"{error_words(summary.errors)} off; of {summary.steps[0].reachability:.1f} % "
         "without errors",
