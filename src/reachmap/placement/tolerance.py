@@ -127,6 +127,8 @@ def worst_case(
     lost = np.array(
         [own if e.score is None else max(least - e.score.score, 0.0) for e in found]
     )
+    # No more was looked for where the rest is the sample's noise.
+    lost[lost <= NOISE_POINTS] = 0.0
     return WorstCase(score=max(own - float(lost.max()), 0.0), lost=lost)
 
 

@@ -81,7 +81,8 @@ class MotionBound:
         Parameters
         ----------
         Q : array, shape (n, dof)
-        half_change : array, shape (dof,)
+        half_change : array, shape (dof,) or (n, dof)
+            Of all motions, or of each.
 
         Returns
         -------
@@ -91,7 +92,8 @@ class MotionBound:
         """
         first = self._speed_m(Q, half_change).max(axis=1)
         size = np.abs(half_change)
-        second = size[self._chain.is_revolute].sum() * float(size @ self._reach_m)
+        turns = size[..., self._chain.is_revolute].sum(axis=-1)
+        second = turns * (size @ self._reach_m)
         return np.asarray(np.maximum(first + second, size @ self._beside_m))
 
     def of_bodies_m(self, Q: FloatArray, half_change: FloatArray) -> FloatArray:

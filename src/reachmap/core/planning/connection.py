@@ -94,6 +94,7 @@ def connect(
     *,
     seed: int,
     on_frame: Callable[[], object] = lambda: None,
+    is_enough: Callable[[BoolArray], bool] = lambda reached: False,
 ) -> Connection:
     """Find which frames the scan configuration is connected to.
 
@@ -107,12 +108,15 @@ def connect(
     seed : int
     on_frame : callable
         Called for each frame that is reached, to report progress.
+    is_enough : callable
+        Is told which frames straight motions reach; where that will do, nothing is
+        planned, and the rest is in no component.
     """
     windings = Windings(motions.checker.robot)
     turns = windings.nearest(goals.Q, start, goals.low, goals.high)
     roadmap = Roadmap.of(start, goals.turned(turns))
     connector = _Connector(roadmap, motions, windings, spec, seed, on_frame)
-    connector.connect()
+    connector.connect(is_enough)
     return connector.connection()
 
 
@@ -157,13 +161,15 @@ class _Connector:
             roadmap, self._candidates, self._known, windings, on_frame
         )
 
-    def connect(self) -> None:
+    def connect(self, is_enough: Callable[[BoolArray], bool]) -> None:
         """Explore, then plan to whatever is open."""
         first = self._component(np.zeros(0, np.int64))
         with _Meter(self, first, STRAIGHT):
             first.members = self._explorer.explore_start()
         first.attempts = 1
         self._reached.append(first)
+        if is_enough(np.asarray(self._roadmap.frame_reached, bool)):
+            return
         self._plan_to_all()
         nodes = components_of_open_goals(
             self._roadmap, self._candidates, self._known, self._windings

@@ -65,10 +65,14 @@ class MotionChecker:
 
     def is_verified(self, q_from: FloatArray, q_to: FloatArray) -> bool:
         """Check a motion, ends included, at the verification distance."""
-        checker = self.checker
         change = q_to - q_from
-        finest_m = self.verification_distance_m / 2
-        pending = self._pieces(q_from, change)
+        return self._covers(q_from, change, self._pieces(q_from, change))
+
+    def _covers(
+        self, q_from: FloatArray, change: FloatArray, pending: deque[_Piece]
+    ) -> bool:
+        """Whether pieces of a motion, or what they are halved into, are all free."""
+        checker, finest_m = self.checker, self.verification_distance_m / 2
         unseen = len(pending)
         while pending:
             share, half_share, reach_m = pending.popleft()
@@ -144,6 +148,23 @@ class MotionChecker:
             for part in range(count)
         ]
         return deque(pieces[k] for k in (0, *_halving(len(pieces))))
+
+    def way_is_verified(self, way: FloatArray) -> bool:
+        """:meth:`path_is_verified` of a way of short steps, in less time.
+
+        The tighter bound, found for all steps at once, leaves fewer configurations to
+        be checked; others than by :meth:`is_verified`.
+        """
+        change = np.diff(way, axis=0)
+        middle, half = way[:-1] + change / 2, change / 2
+        reach_m = np.minimum(
+            np.abs(half) @ self.checker.reach_m,
+            self.checker.bound.displacement_m(middle, half),
+        )
+        return all(
+            self._covers(way[k], change[k], deque([(0.5, 0.5, reach)]))
+            for k, reach in enumerate(reach_m.tolist())
+        )
 
     def path_is_verified(self, path: FloatArray) -> bool:
         """:meth:`is_verified` of every segment, shape (n, dof)."""

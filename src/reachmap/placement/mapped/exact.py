@@ -212,12 +212,12 @@ class PlacedScene:
             # Given up half-way: another question may need all of it.
             self._first = None
             return first.bound, None
-        connection = self._connect(q, first)
+        connection = self._connect(q, first, enough)
         score = self._score(connection)
         if score.score < min(enough, first.bound) - ROUNDING:
             every = self._with_other_branches(first, connection)
             if len(every.frame) > len(first.frame):
-                score = self._score(self._connect(q, every))
+                score = self._score(self._connect(q, every, enough))
         return first.bound, score
 
     def _first_goals(self, above: float) -> _Goals:
@@ -251,16 +251,16 @@ class PlacedScene:
         rows = goals.tried[frames]
         goals.tried[frames] += 1
         ways = self._approach.of_many(self._rolled[self._row[rows]], self.Q[rows])
-        free = np.zeros(len(frames), bool)
+        free, motions = np.zeros(len(frames), bool), self.scene.motions
         for k, (frame, way) in enumerate(zip(frames.tolist(), ways, strict=True)):
-            if way is None or (len(way) > 1 and not self._approach.is_free(way)):
+            if way is None or (len(way) > 1 and not motions.way_is_verified(way)):
                 continue
             free[k] = True
             goals.way.append(way)
             goals.frame.append(frame)
         return free
 
-    def _connect(self, q: FloatArray, goals: _Goals) -> Connection:
+    def _connect(self, q: FloatArray, goals: _Goals, enough: float) -> Connection:
         cell = self.scene.loaded.cell
         ways = [goals.way[k] for k in np.argsort(goals.frame, kind="stable")]
         dof = self.scene.robot.dof
@@ -279,7 +279,12 @@ class PlacedScene:
             self.scene.motions,
             effort(cell.roadmap),
             seed=cell.seed,
+            is_enough=lambda reached: self._percent(reached) >= enough,
         )
+
+    def _percent(self, reached: BoolArray) -> float:
+        """What frames count for, those beyond the array being none of them [%]."""
+        return 100.0 * float(self._sample.weight[: len(reached)] @ reached)
 
     def _score(self, connection: Connection) -> PoseScore:
         sample = self._sample
