@@ -17,6 +17,7 @@ from reachmap.maps.parts import StageStatus
 from reachmap.runtime.options import RunOptions
 from reachmap.scans.cycle.scenes import STAGES, CycleScenes
 from reachmap.tools.bin_scan import bin_scan
+from reachmap.tools.check import check
 from tests.support.cycle_replay import faults_of_cycle, paths_by_stage
 
 V, A = 2.0, 4.0
@@ -239,6 +240,20 @@ def test_parts_that_cannot_be_there_are_refused(tmp_path, overrides, message):
     with pytest.raises(SceneError, match=message):
         scan(tmp_path, *overrides)
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("override", "message"),
+    [
+        ("drop_off={pose: {xyz: [5, 0, 0]}}", "nothing can be put down at 'drop-off'"),
+        ("bin_scan.layers=[0.02]", "10 mm or more inside the bin bottom"),
+    ],
+)
+def test_check_says_so_before_any_scan(override, message):
+    """And lists the part among the bodies."""
+    answer = check("planar-toy", (*TOY, override))
+    assert any(message in warning for warning in answer.warnings)
+    assert "part" in [row.name for row in answer.bodies]
 
 
 def test_a_place_out_of_reach_is_a_result(tmp_path):

@@ -16,6 +16,7 @@ from reachmap.core.scene import Scene
 from reachmap.geometry import AXES, inverse_transform, tilt_rad
 from reachmap.placement.mapped.imaging import picture_of
 from reachmap.sampling.frames import approach_distance_m, below_rim_m
+from reachmap.scans.cycle.doubts import cycle_doubts
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -150,7 +151,7 @@ def check_loaded(loaded: LoadedCell) -> CellCheck:
         test_grasps=cell.bin_scan.count(),
         approach_m=approach_distance_m(cell),
         below_rim_m=round(below_rim_m(cell), 6),
-        warnings=(*loaded.warnings, *_picture(scene)),
+        warnings=(*loaded.warnings, *_picture(scene), *cycle_doubts(loaded)),
         problems=scene.scan_problems(),
     )
 
@@ -196,6 +197,17 @@ def _bodies(loaded: LoadedCell) -> tuple[BodyRow, ...]:
         )
         for body in loaded.cell.bodies
     ]
+    held = loaded.cell.held()
+    if held is not None:
+        name, part = held
+        rows.append(
+            BodyRow(
+                name=name,
+                attach_to="the tool after the grasp",
+                shape=shape_text(part.shape),
+                touch=part.touch,
+            )
+        )
     T_world_base = inverse_transform(loaded.cell.T_base_world())
     faces = top_faces(loaded.cell, np.eye(4))
     for place, tray in loaded.cell.every_bin():

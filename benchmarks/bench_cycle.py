@@ -1,0 +1,245 @@
+"""The pick cycle: what it refutes, what it costs, whether it is right, how quick it is.
+
+``python benchmarks/bench_cycle.py [CELL or MAP ...]`` prints for each (by default the
+two shipped cells with a conveyor and three of benchmarks/hard_cells, with parts of
+their own):
+
+- how many reachable test grasps lift, transfer and return refute, and why; those at
+  which the part would start inside the bin are no grasps of that part, and counted
+  apart;
+- CPU time of the scan with and without the part, in one run (cells only);
+- precision and recall of the nearest test grasp's cycle against planning without a
+  map (:mod:`reachmap.scans.cycle.fresh`), on random grasps anywhere in the bin;
+- the time of planned segments over the least that is known between the same ends: of
+  six plans, each shortened three times as long as the scan does.
+
+``--grid X,Y`` scans a coarser grid, ``--random N`` and ``--sample N`` set the number
+of random grasps and of cycles that are compared.
+"""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+import time
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+
+from reachmap._typing import FloatArray, IntArray
+from reachmap.cell.loaded import LoadedCell
+from reachmap.core.planning.routes import shorten_until
+from reachmap.core.scene import Scene
+from reachmap.maps import BinMap, Status, read_bin_map
+from reachmap.maps.parts import StageStatus
+from reachmap.ranking import Ranker, rank_list
+from reachmap.runtime.options import RunOptions
+from reachmap.scans.cycle.fresh import FreshCycles
+from reachmap.scans.cycle.scenes import RETURN, STAGES, TRANSFER, CycleScenes
+from reachmap.tools.bin_scan import bin_scan
+from reachmap.tools.options import cell_of_artefact
+from reachmap.validation.picks import picks_of, tool_poses
+from reachmap.validation.random_grasps import random_grasps
+
+HARD = Path(__file__).parent / "hard_cells"
+PLATE = "part={shape: {box: [0.08, 0.05, 0.04]}, pose: {xyz: [0, 0, 0.02]}, yaw: free}"
+BLOCK = "part={shape: {box: [0.06, 0.04, 0.04]}, pose: {xyz: [0, 0, 0.02]}, yaw: free}"
+PLACE = "drop_off={{pose: {{xyz: {}, rpy_deg: [180, 0, 0]}}, free_about: z}}"
+CASES: dict[str, tuple[str, ...]] = {
+    "ur5-conveyor": (),
+    "ur10-deep-conveyor": (),
+    str(HARD / "deep-klt-ur10.yaml"): (
+        PLATE, PLACE.format("[0.30, -0.75, -0.20]"), "bin_scan.layers=[0.05, 0.20]",
+    ),
+    str(HARD / "two-bins-ur5.yaml"): (
+        PLATE, PLACE.format("[0.50, 0.20, -0.20]"), "bin_scan.layers=[0.05, 0.15]",
+    ),
+    str(HARD / "machine-door-ur5.yaml"): (
+        BLOCK, PLACE.format("[0.05, 0.55, 0.10]"), "bin_scan.layers=[0.055, 0.10]",
+    ),
+}  # fmt: skip
+ROLLS = 24
+PLANS = 6
+
+
+def main() -> None:
+    """Print all of it."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("cases", nargs="*")
+    parser.add_argument("--grid")
+    parser.add_argument("--random", type=int, default=200)
+    parser.add_argument("--sample", type=int, default=20)
+    asked = parser.parse_args()
+    grid = (f"bin_scan.grid=[{asked.grid}]",) if asked.grid else ()
+    for case in asked.cases or CASES:
+        name = next((key for key in CASES if Path(key).stem == Path(case).stem), case)
+        print(f"\n{Path(case).stem}", flush=True)
+        if Path(case).suffix == ".h5":
+            record = read_bin_map(Path(case))
+        else:
+            record = scanned(name, (*CASES.get(name, ()), *grid))
+        refuted(record)
+        against_fresh_plans(record, asked.random)
+        over_the_best_known(record, asked.sample)
+
+
+def scanned(cell: str, overrides: tuple[str, ...]) -> BinMap:
+    """Scan with the part and without, and print the CPU time of both."""
+    with tempfile.TemporaryDirectory() as folder:
+        path, spent = Path(folder) / "bin.h5", []
+        for change in ((), ("part=null",)):
+            begin = time.process_time()
+            bin_scan(
+                None,
+                path,
+                cell=cell,
+                overrides=(*overrides, *change),
+                run=RunOptions(quiet=True, overwrite=True),
+            )
+            spent.append(time.process_time() - begin)
+            if not change:
+                record = read_bin_map(path)
+    whole, plain = spent
+    print(
+        f"  scan: {whole:.1f} CPU s with the cycle, {plain:.1f} s without, "
+        f"{whole / plain:.2f} times as long"
+    )
+    return record
+
+
+def refuted(record: BinMap) -> None:
+    """Print what became of the reachable test grasps."""
+    cycle = record.cycle
+    assert cycle is not None
+    reachable = record.status == Status.PATH_FOUND
+    status = cycle.status[reachable]
+    absent = status[:, 0] == StageStatus.PART_IN_COLLISION
+    whole = (status == StageStatus.PATH_FOUND).all(axis=-1)
+    left = len(status) - int(absent.sum())
+    lost = left - int(whole.sum())
+    print(
+        f"  {reachable.sum()} of {reachable.size} test grasps reachable; at "
+        f"{absent.sum()} the part starts inside the bin; of the other {left} the cycle "
+        f"refutes {lost} ({100 * lost / max(left, 1):.1f} %)"
+    )
+    pulled_back(record, np.argwhere(cycle.drop_off >= 0))
+    pairs = cycle.blocking_pair[reachable]
+    causes = Counter(
+        (STAGES[k], StageStatus(code).name.lower(),
+         record.body_pairs[pair] if pair >= 0 else "")
+        for k in range(status.shape[1])
+        for code, pair in zip(status[:, k], pairs[:, k], strict=True)
+        if code not in (StageStatus.PATH_FOUND, StageStatus.NOT_ATTEMPTED)
+    )  # fmt: skip
+    for (stage, code, pair), count in causes.most_common(8):
+        print(f"    {count:5} {stage}: {code} {pair}")
+    seconds = cycle.cycle_time[np.isfinite(cycle.cycle_time)]
+    if len(seconds):
+        low, middle, high = np.percentile(seconds, [5, 50, 95])
+        print(f"  cycle time: median {middle:.2f} s, 5-95 % {low:.2f} to {high:.2f} s")
+
+
+def pulled_back(record: BinMap, grasps: IntArray) -> None:
+    """Print how many whole cycles would hit the bin on the way that they came."""
+    assert record.best is not None
+    levels, ends = levels_of(record), np.cumsum(record.paths.row_size)
+    hit = 0
+    for grasp in grasps:
+        scene = Scene.shared(
+            levels[int(grasp[0]) if len(levels) > 1 else 0], load="lifted"
+        )
+        row = int(record.best.row[tuple(grasp)])
+        begin = ends[row] - record.paths.row_size[row]
+        path = record.paths.configuration[begin : ends[row]]
+        hit += not scene.motions.path_is_verified(path[::-1])
+    print(
+        f"  pulled back along its way in, the part would hit something in {hit} of "
+        f"{len(grasps)} whole cycles ({100 * hit / max(len(grasps), 1):.0f} %)"
+    )
+
+
+def levels_of(record: BinMap) -> tuple[LoadedCell, ...]:
+    """The map's cell for each level of the parts."""
+    return cell_of_artefact(record.provenance, "map", ()).fillings()
+
+
+def against_fresh_plans(record: BinMap, count: int) -> None:
+    """Print precision and recall on random grasps."""
+    grasps = random_grasps(record, count, seed=1)
+    ranked = rank_list(grasps, Ranker(record))
+    picks, nearest = picks_of(ranked), ranked.ranking.test_grasp
+    levels = levels_of(record)
+    fresh: dict[int, FreshCycles] = {}
+    assert record.cycle is not None
+    whole = (record.cycle.status == StageStatus.PATH_FOUND).all(axis=-1)
+    table = np.zeros((2, 2), int)
+    missed: Counter[str] = Counter()
+    for row in range(len(picks)):
+        level = int(nearest[row, 0]) if len(levels) > 1 else 0
+        if level not in fresh:
+            scenes = CycleScenes.of(levels[level])
+            assert scenes is not None
+            fresh[level] = FreshCycles(scenes)
+        T = tool_poses(picks, row, rolls=ROLLS, approach_axis=record.approach_axis)
+        verdict = fresh[level].plan(T, seed=row).status
+        said, true = bool(whole[tuple(nearest[row])]), verdict == StageStatus.PATH_FOUND
+        table[int(said), int(true)] += 1
+        if said and not true:
+            missed[verdict.name.lower()] += 1
+    (_, false_no), (false_yes, yes) = table
+    print(
+        f"  {len(picks)} random grasps: precision {yes}/{yes + false_yes} = "
+        f"{yes / max(yes + false_yes, 1):.3f}, recall {yes}/{yes + false_no} = "
+        f"{yes / max(yes + false_no, 1):.3f}; said and not found: {dict(missed)}"
+    )
+
+
+def over_the_best_known(record: BinMap, count: int) -> None:
+    """Print how long planned segments take over the best known of the same ends."""
+    assert record.cycle is not None
+    assert record.paths.stage is not None
+    assert record.best is not None
+    stage, levels = record.paths.stage, levels_of(record)
+    chosen = np.argwhere(record.cycle.drop_off >= 0)
+    rows = np.random.default_rng(1).permutation(len(chosen))[:count]
+    ends = np.cumsum(record.paths.row_size)
+    stored, least = 0.0, 0.0
+    for grasp in chosen[rows]:
+        scenes = CycleScenes.of(levels[int(grasp[0]) if len(levels) > 1 else 0])
+        assert scenes is not None
+        at = np.flatnonzero((record.paths.index[:, :4] == grasp).all(axis=1))
+        for row in at:
+            if stage[row] == 0 and row != record.best.row[tuple(grasp)]:
+                continue
+            if stage[row] not in (0, TRANSFER + 1, RETURN + 1):
+                continue
+            begin = ends[row] - record.paths.row_size[row]
+            path = record.paths.configuration[begin:][: record.paths.planned_size[row]]
+            held = stage[row] == TRANSFER + 1
+            scene = scenes.carried if held else scenes.empty
+            now = scene.time_law.path_time_s(path)
+            stored, least = stored + now, least + min(now, best_known_s(scene, path))
+    print(
+        f"  planned segments of {len(rows)} cycles: {stored / max(least, 1e-9):.3f} "
+        "times the best known between the same ends"
+    )
+
+
+def best_known_s(scene: Scene, path: FloatArray) -> float:
+    """Least time of several plans between the ends of a path."""
+    found = [path]
+    for seed in range(PLANS):
+        plan = scene.planner.plan(path[0], path[-1:], seed)
+        found += [] if plan.path is None else [plan.path]
+    times = []
+    for seed, way in enumerate(found):
+        rng = np.random.default_rng(seed)
+        for _ in range(3):
+            way = shorten_until(way, scene.motions, rng, 1e-3)
+        times.append(scene.time_law.path_time_s(way))
+    return min(times)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,35 @@
+"""What can be said against a cell's pick cycle before any scan."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from reachmap.errors import SceneError
+from reachmap.scans.cycle.part_fit import require_room_for_part
+from reachmap.scans.cycle.places import ways_to_place
+from reachmap.scans.cycle.scenes import CycleScenes
+
+if TYPE_CHECKING:
+    from reachmap.cell.loading import LoadedCell
+
+
+def cycle_doubts(loaded: LoadedCell) -> list[str]:
+    """Sentences about a part that has no room, and drop-offs that are out of reach."""
+    scenes = CycleScenes.of(loaded)
+    if scenes is None:
+        return []
+    try:
+        scenes.home()
+        require_room_for_part(scenes)
+    except SceneError as error:
+        return list(error.lines)
+    doubts = []
+    for spec in loaded.cell.drop_offs:
+        ways, pair = ways_to_place(scenes, spec)
+        if not ways:
+            cause = pair or "out of reach, or the straight way leads out of it"
+            doubts.append(
+                f"{loaded.source}: drop_off: nothing can be put down at "
+                f"{spec.name!r} ({cause})"
+            )
+    return doubts
