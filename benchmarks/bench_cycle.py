@@ -33,12 +33,12 @@ from reachmap.core.planning.routes import shorten_until
 from reachmap.core.scene import Scene
 from reachmap.maps import BinMap, Status, read_bin_map
 from reachmap.maps.parts import StageStatus
+from reachmap.maps.provenance import cell_of_artefact
 from reachmap.ranking import Ranker, rank_list
 from reachmap.runtime.options import RunOptions
 from reachmap.scans.cycle.fresh import FreshCycles
 from reachmap.scans.cycle.scenes import RETURN, STAGES, TRANSFER, CycleScenes
 from reachmap.tools.bin_scan import bin_scan
-from reachmap.tools.options import cell_of_artefact
 from reachmap.validation.picks import picks_of, tool_poses
 from reachmap.validation.random_grasps import random_grasps
 

@@ -78,11 +78,6 @@ def trapezoid_s(q_from: np.ndarray, q_to: np.ndarray) -> float:
     return 2 * np.sqrt(way / A) if way <= V * V / A else way / V + V / A
 
 
-def reached(record) -> np.ndarray:
-    """Test grasps that the arm reaches, as rows of four indices."""
-    return np.argwhere(record.status == Status.PATH_FOUND)
-
-
 def test_walls_take_the_outermost_grasps(toy):
     """A part 20 mm wide keeps 2 mm from walls 200 mm apart: |x| up to 88 mm."""
     found = toy.status == Status.PATH_FOUND

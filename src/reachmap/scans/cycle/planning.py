@@ -120,6 +120,7 @@ class CyclePlanner:
         self._transfers = Transfers(scenes, shared.places, shared.hubs)
         self._windings = Windings(scenes.empty.robot)
         self._cell, self._law = scenes.empty.loaded.cell, scenes.empty.time_law
+        self._known_s: dict[bytes, float] = {}
         self.stages = len(stages_of(scenes.empty.loaded))
         self._goes_somewhere = self.stages > 1
 
@@ -204,15 +205,22 @@ class CyclePlanner:
             way_in=way_in,
             in_s=self._in_s(way_in),
             lift=lift,
-            lift_s=self._law.way_time_s(lift),
+            lift_s=self._way_s(lift),
             transfer=transfer,
         )
 
     def _in_s(self, way: WayIn) -> float:
         begin = max(way.planned - 1, 0)
         return self._law.path_time_s(way.path[: way.planned]) + (
-            self._law.way_time_s(way.path[begin:])
+            self._way_s(way.path[begin:])
         )
+
+    def _way_s(self, way: FloatArray) -> float:
+        """Time of a straight way, which many paths share."""
+        key = way.tobytes()
+        if key not in self._known_s:
+            self._known_s[key] = self._law.way_time_s(way)
+        return self._known_s[key]
 
     def _lift_at(self, goal: int, q: FloatArray) -> FloatArray | None:
         """Lift of a goal from its grasp at whatever turns; None outside the limits."""
@@ -278,7 +286,7 @@ class CyclePlanner:
         """Time and length of the shortest lift of some goals."""
         lifts = [self._lifts.ways[int(goal)] for goal in goals]
         lift = min(lifts, key=path_length_rad)
-        return self._law.way_time_s(lift), path_length_rad(lift)
+        return self._way_s(lift), path_length_rad(lift)
 
     def _without_place(self, goals: IntArray) -> CyclePlan:
         """No drop-off can be used: the stage that fails, and the bodies in the way."""

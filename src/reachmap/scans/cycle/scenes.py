@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from reachmap.cell.loading import LoadedCell
 
 STAGES = ("lift", "transfer", "place", "retreat", "return")
-LIFT, TRANSFER, PLACE, RETREAT, RETURN = range(len(STAGES))
+LIFT, TRANSFER, PLACE, _, RETURN = range(len(STAGES))
 
 
 def stages_of(loaded: LoadedCell) -> tuple[str, ...]:
