@@ -20,6 +20,7 @@ of random grasps and of cycles that are compared.
 from __future__ import annotations
 
 import argparse
+import json
 import tempfile
 import time
 from collections import Counter
@@ -34,7 +35,7 @@ from reachmap.core.scene import Scene
 from reachmap.maps import BinMap, Status, read_bin_map
 from reachmap.maps.parts import StageStatus
 from reachmap.maps.provenance import cell_of_artefact
-from reachmap.ranking import Ranker, rank_list
+from reachmap.ranking import GraspList, Ranker, grasps_from_document, rank_list
 from reachmap.runtime.options import RunOptions
 from reachmap.scans.cycle.fresh import FreshCycles
 from reachmap.scans.cycle.scenes import RETURN, STAGES, TRANSFER, CycleScenes
@@ -166,7 +167,7 @@ def levels_of(record: BinMap) -> tuple[LoadedCell, ...]:
 
 def against_fresh_plans(record: BinMap, count: int) -> None:
     """Print precision and recall on random grasps."""
-    grasps = random_grasps(record, count, seed=1)
+    grasps = on_layers(record, count)
     ranked = rank_list(grasps, Ranker(record))
     picks, nearest = picks_of(ranked), ranked.ranking.test_grasp
     levels = levels_of(record)
@@ -193,6 +194,17 @@ def against_fresh_plans(record: BinMap, count: int) -> None:
         f"{yes / max(yes + false_yes, 1):.3f}, recall {yes}/{yes + false_no} = "
         f"{yes / max(yes + false_no, 1):.3f}; said and not found: {dict(missed)}"
     )
+
+
+def on_layers(record: BinMap, count: int) -> GraspList:
+    """Random grasps at the heights of the layers: a part lies on what is below it."""
+    listed = random_grasps(record, count, seed=1)
+    document = json.loads(json.dumps(listed.document))
+    for grasp in document["grasps"]:
+        x, y, z = grasp["position"]
+        nearest = float(record.layer[np.argmin(np.abs(record.layer - z))])
+        grasp["position"] = [x, y, nearest]
+    return grasps_from_document(document, source=f"random {count}")
 
 
 def over_the_best_known(record: BinMap, count: int) -> None:
