@@ -148,7 +148,7 @@ def _robot(c: StarterChoices) -> str:
     lines += [
         "  # GUESS: the link that carries the tool, the tool centre point in its",
         "  # frame, and the axis of it that points into the object.",
-        f"  tcp: {{parent: {scalar(c.tip)}, xyz: {scalar(_tcp_xyz(c))}, "
+        f"  tcp: {{parent: {scalar(c.tip)}, xyz: {scalar(tcp_xyz(c))}, "
         f'approach_axis: "{c.approach_axis}"}}',
     ]
     names = ", ".join(joint.name for joint in c.joints)
@@ -172,7 +172,7 @@ def _robot(c: StarterChoices) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _tcp_xyz(c: StarterChoices) -> list[float]:
+def tcp_xyz(c: StarterChoices) -> list[float]:
     """TCP in the frame of the tip [m]."""
     length_m = c.tool_m if c.approach_axis[0] == "+" else -c.tool_m
     return [length_m or 0 if axis == c.approach_axis[1] else 0 for axis in "xyz"]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import product
 
@@ -85,17 +85,11 @@ def guess_bin(
     with_tool : bool
         Whether the TCP may be put beyond the tip, as if on a tool.
     """
-    fit = BinFit(scene.robot, scene.loaded, None)
-    avoided = ""
-    trials: list[_Trial] = []
     places = list(_places(T_base_tcp[:, :3, 3]))
     near = [place for place in places if _comes_near(scene, T_base_tcp, place[0])]
-    for xyz_m, yaw_deg in near or places:
-        contact = fit.contact(yaw_transform(*xyz_m, np.radians(yaw_deg)))
-        if contact is None:
-            trials.append(_Trial(scene, xyz_m, yaw_deg))
-        elif not trials:
-            avoided = avoided or contact.other
+    trials, avoided = _clear(scene, near)
+    if not trials:
+        trials, avoided = _clear(scene, places)
     pairs = product(range(len(trials)), TOOLS[: None if with_tool else 1])
     best: BinGuess | None = None
     why = ""
@@ -119,9 +113,46 @@ def guess_bin(
     return best
 
 
+def guess_notes(guess: BinGuess, tip: str) -> list[str]:
+    """What is unusual about the bin and the tool that were guessed."""
+    if not guess.share:
+        return [
+            f"no grasp in the bin is met at the places that were tried: {guess.why}"
+        ]
+    notes = []
+    few = "few grasps are met"
+    if guess.odd_place:
+        where = ", ".join(f"{value:g}" for value in guess.xyz_m)
+        why = few if guess.tool_m else guess.why or few
+        reason = f"it would meet {guess.avoided}" if guess.avoided else why
+        notes.append(f"the bin stands at ({where}): in front of the base {reason}")
+    if guess.tool_m:
+        notes.append(
+            f"robot.tcp is {guess.tool_m:g} m beyond {tip}, as if on a tool: at {tip} "
+            f"itself {guess.why or few}"
+        )
+    return notes
+
+
 def _oddness(pair: tuple[int, float]) -> float:
     """How unusual a place, counted from the most usual, and a tool are together."""
     return pair[0] + PLACES_PER_TOOL * pair[1]
+
+
+def _clear(
+    scene: Scene, places: Sequence[tuple[Place, float]]
+) -> tuple[list[_Trial], str]:
+    """Places where the bin is clear of what stands still, and what bars the first."""
+    fit = BinFit(scene.robot, scene.loaded, None)
+    trials: list[_Trial] = []
+    avoided = ""
+    for xyz_m, yaw_deg in places:
+        contact = fit.contact(yaw_transform(*xyz_m, np.radians(yaw_deg)))
+        if contact is None:
+            trials.append(_Trial(scene, xyz_m, yaw_deg))
+        elif not trials:
+            avoided = avoided or contact.other
+    return trials, avoided
 
 
 class _Trial:

@@ -21,6 +21,7 @@ from reachmap.cell.starter import (
     cell_name,
     middle_position,
     starter_text,
+    tcp_xyz,
     user_value,
 )
 from reachmap.cell.text.messages import did_you_mean
@@ -34,13 +35,15 @@ from reachmap.errors import CellError, ReachmapError, SceneError, SettingsError
 from reachmap.geometry import quaternion_wxyz_from_rotation
 from reachmap.maps.bytes.publish import check_output, publish
 from reachmap.tools import trial
-from reachmap.tools.bin_guess import ENOUGH, BinGuess, guess_bin
+from reachmap.tools.bin_guess import ENOUGH, BinGuess, guess_bin, guess_notes
 from reachmap.tools.robot_source import RobotSource, read_source
 
 LABEL = "starter cell"
 # A named state is taken for the scan configuration if it looks down at least so much
 # (cosine of 60 degrees).
 LOOKS_DOWN = 0.5
+# Thickness of a supposed tool [m]: that of the gripper in the starter cell's examples.
+ROD_M = 0.03
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -291,7 +294,7 @@ class _Attempt:
             bin_yaw_deg=best.yaw_deg,
             tool_m=best.tool_m,
         )
-        self.notes += _words(best, tip)
+        self.notes += guess_notes(best, tip)
         return Scene.build(self._loaded())
 
     def _with_scan_configuration(self, scene: Scene, Q: FloatArray) -> tuple[str, ...]:
@@ -310,7 +313,10 @@ class _Attempt:
                 f"no named state is free and looks down ({', '.join(states)}); "
                 "the scan configuration was searched for"
             )
-        found = trial.best_view(scene, Q, axis, reach)
+        found = None
+        if self.choices.tool_m:
+            found = trial.best_view(self._with_tool(), Q, axis, reach)
+        found = found or trial.best_view(scene, Q, axis, reach)
         if found is None:
             return ("no free scan configuration was found",)
         values = {
@@ -320,6 +326,21 @@ class _Attempt:
         self.choices = replace(self.choices, scan_deg=values)
         return ()
 
+    def _with_tool(self) -> Scene:
+        """The scene with a rod from the tip to the TCP, which supposes a tool."""
+        chosen, along = self.choices, np.array(tcp_xyz(self.choices), float)
+        rod = {
+            "name": "supposed-tool",
+            "attach_to": chosen.tip,
+            "shape": {"box": np.maximum(np.abs(along), ROD_M).tolist()},
+            "pose": {"xyz": (0.5 * along).tolist()},
+        }
+        self.choices = replace(chosen, bodies=(*chosen.bodies, f"  - {scalar(rod)}"))
+        try:
+            return Scene.build(self._loaded())
+        finally:
+            self.choices = chosen
+
     def _states(self) -> dict[str, dict[str, float]]:
         """Named states that say where every joint is."""
         moveit = self._source.moveit
@@ -328,27 +349,6 @@ class _Attempt:
             for name, values in ({} if moveit is None else moveit.states).items()
             if all(joint.name in values for joint in self.choices.joints)
         }
-
-
-def _words(guess: BinGuess, tip: str) -> list[str]:
-    """What is unusual about the bin and the tool that were guessed."""
-    if not guess.share:
-        return [
-            f"no grasp in the bin is met at the places that were tried: {guess.why}"
-        ]
-    notes = []
-    few = "few grasps are met"
-    if guess.odd_place:
-        where = ", ".join(f"{value:g}" for value in guess.xyz_m)
-        why = few if guess.tool_m else guess.why or few
-        reason = f"it would meet {guess.avoided}" if guess.avoided else why
-        notes.append(f"the bin stands at ({where}): in front of the base {reason}")
-    if guess.tool_m:
-        notes.append(
-            f"robot.tcp is {guess.tool_m:g} m beyond {tip}, as if on a tool: at {tip} "
-            f"itself {guess.why or few}"
-        )
-    return notes
 
 
 def _below(robot: UrdfDescription, base: str) -> set[str]:
