@@ -264,7 +264,7 @@ def test_wrong_moveit_limits_are_refused(
         ("turn: 90, ", "", "q_deg: joints are missing: turn"),
         ("name: post", "name: arm", "'arm' is the name of a link"),
         ("name: post", "name: bin", "'bin' is the name of a link, a frame or the bin"),
-        ("name: post", "name: bin wall", "bodies[bin wall].name: "),
+        ("name: post", "name: bin wall", r"bodies\[bin wall\]\.name: "),
         ("name: post", "name: post\n    touch: [bse]", "no link or body 'bse'"),
         ("name: post", "name: post\n    attach_to: no", "no frame 'no' in the URDF"),
         ("parent: tip", "parent: base", "no joint moves between the base and the TCP"),

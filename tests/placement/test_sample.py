@@ -222,5 +222,5 @@ def test_rolls_turn_about_the_approach_axis():
         )
         assert angles == pytest.approx([0, 90, 180, 90])
     np.testing.assert_array_equal(
-        rolls_of(read_cell("ur5-eye-in-hand").cell), np.eye(4)[None]
+        rolls_of(read_cell("ur5-eye-in-hand", (LISTED,)).cell), np.eye(4)[None]
     )

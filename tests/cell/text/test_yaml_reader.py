@@ -76,7 +76,7 @@ def test_duplicate_keys_are_mistakes_with_both_places() -> None:
     """The first value is kept, the second is reported."""
     document = parse_yaml("a: 1\nb: 2\na: 3\na: {c: [4]}\nd: 5\n", "cell.yaml")
     assert document.data == {"a": 1, "b": 2, "d": 5}
-    assert [str(mistake) for mistake in document.mistakes] == [
+    assert [one.text(document.data) for one in document.mistakes] == [
         "cell.yaml:3:1: a: key given twice (first at cell.yaml:1:1)",
         "cell.yaml:4:1: a: key given twice (first at cell.yaml:1:1)",
     ]

@@ -22,6 +22,8 @@ from reachmap.core.planning.roadmap import Roadmap
 
 # Spread of the samples around an open goal, from the width of a gap to the next room.
 _AROUND_RAD = (0.05, 1.0)
+# More samples per dimension tell an arm of few joints nothing new.
+_PER_JOINT = 10
 # So many times the neighbours, one after another, while motions run out too soon.
 _WIDER = (1, 4)
 
@@ -83,7 +85,8 @@ class LazySamples:
 
     def _free_samples(self, around: FloatArray, rng: np.random.Generator) -> FloatArray:
         """Half of the samples anywhere, half around the open goals; the free ones."""
-        robot, count = self._motions.checker.robot, self._spec.samples
+        robot = self._motions.checker.robot
+        count = min(self._spec.samples, _PER_JOINT**robot.dof)
         low, high = robot.lower_rad, robot.upper_rad
         anywhere = rng.uniform(low, high, (count - count // 2, robot.dof))
         centre = around[rng.integers(0, len(around), count // 2)]
