@@ -164,9 +164,12 @@ XACRO = (
 @pytest.mark.parametrize(
     "arguments",
     [
-        ("name:=ur", "size:=2"),
-        ("--xacro-arg", "name=ur", "--xacro-arg", "size=2"),
         ("name:=ur", "--xacro-arg", "size:=2"),
+        pytest.param(("name:=ur", "size:=2"), marks=pytest.mark.slow),
+        pytest.param(
+            ("--xacro-arg", "name=ur", "--xacro-arg", "size=2"),
+            marks=pytest.mark.slow,
+        ),
     ],
 )
 def test_xacro_arguments_stay_in_the_cell(

@@ -46,6 +46,7 @@ def test_the_chain_is_made_one_from_the_other(folder: Path) -> None:
     assert any((made / "pictures").iterdir())
 
 
+@pytest.mark.slow
 def test_what_is_missing_alone_is_made_again(folder: Path) -> None:
     """The same command goes on after the last whole artefact."""
     made = folder / "run"

@@ -34,6 +34,8 @@ UR5_FEW = (
     "workspace_scan.cubes.0.grid=[3,2]",
     "workspace_scan.cubes.1.grid=[3,2]",
     "workspace_scan.z_step=0.5",
+    "roadmap.max_checks=1000",
+    "roadmap.sample_checks=2000",
 )
 
 

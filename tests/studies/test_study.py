@@ -80,6 +80,7 @@ def test_what_is_wrong_in_every_variant_is_wrong_input(tmp_path: Path) -> None:
     assert not [*tmp_path.iterdir()]
 
 
+@pytest.mark.slow
 def test_a_placed_bin_is_that_of_place_bin(tmp_path: Path) -> None:
     """With --place each variant rests on a placement, by content hash."""
     limits = (*SMALL, "placement.z=[-0.2,-0.2]")
@@ -158,7 +159,9 @@ def test_a_killed_study_goes_on_to_the_same_content(tmp_path: Path) -> None:
     assert whole == killed
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(
+    "seed", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in (1, 2))]
+)
 def test_nothing_is_called_nothing_and_an_effect_an_effect(
     seed: int, tmp_path: Path
 ) -> None:
@@ -217,6 +220,7 @@ def test_intervals_hold_what_they_say() -> None:
     assert mean == pytest.approx(values.mean())
 
 
+@pytest.mark.slow
 def test_the_commands_read_a_study(tmp_path: Path) -> None:
     """study, info, verify and heatmap; a requirement that nobody meets is exit 1."""
     arguments = ["study", "planar-toy", "-j", "1", "--vary", f"{RADIUS}=0.01,0.035"]
