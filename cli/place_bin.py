@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -21,6 +21,11 @@ from reachmap.cli.options import (
     with_bin,
 )
 from reachmap.runtime.options import RunOptions
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from reachmap.maps.records import BinPlacement
 
 AXES = ("x", "y", "z", "yaw")
 
@@ -159,7 +164,7 @@ def command(
         )
     from reachmap.cli.text.placement import placement_lines
     from reachmap.tools.place_bin import PlacementChoice, place_bin, placement_facts
-    from reachmap.tools.place_bins import bin_names, named_output, place_bins
+    from reachmap.tools.place_bins import bin_names, place_bins
 
     limits = {} if region is None else {"x": region[:2], "y": region[2:]}
     choice = PlacementChoice(
@@ -176,17 +181,7 @@ def command(
         several = place_bins(
             workspace, output, choice=choice, overrides=overrides, **how
         )
-        files = {name: named_output(output, name) for name in several}
-        facts = {
-            name: {"output": str(files[name])} | placement_facts(placement)
-            for name, placement in several.items()
-        }
-        lines = [
-            line
-            for name, placement in several.items()
-            for line in (f"bin {name}", *placement_lines(placement, files[name], top))
-        ]
-        say({"bins": facts}, lambda: "\n".join(lines), as_json=as_json)
+        _say_several(several, output, top, as_json=as_json)
         return
     placement = place_bin(
         workspace, output, choice=choice, overrides=with_bin(overrides, bin_name), **how
@@ -196,3 +191,24 @@ def command(
         lambda: "\n".join(placement_lines(placement, output, top)),
         as_json=as_json,
     )
+
+
+def _say_several(
+    placements: Mapping[str, BinPlacement], output: Path, top: int, *, as_json: bool
+) -> None:
+    """Answer with the place of each bin, and the file that it went to."""
+    from reachmap.cli.text.placement import placement_lines
+    from reachmap.tools.place_bin import placement_facts
+    from reachmap.tools.place_bins import named_output
+
+    files = {name: named_output(output, name) for name in placements}
+    facts = {
+        name: {"output": str(files[name])} | placement_facts(placement)
+        for name, placement in placements.items()
+    }
+    lines = [
+        line
+        for name, placement in placements.items()
+        for line in (f"bin {name}", *placement_lines(placement, files[name], top))
+    ]
+    say({"bins": facts}, lambda: "\n".join(lines), as_json=as_json)

@@ -172,10 +172,20 @@ def command(
         ),
         as_json=as_json,
     )
+    _check_gates(answer, min_reachable, fail_if_none=fail_if_none_reachable)
+
+
+def _check_gates(
+    answer: RankAnswer,
+    min_reachable: tuple[float, bool] | None,
+    *,
+    fail_if_none: bool,
+) -> None:
+    """Fail where fewer grasps are reachable than were asked for."""
     if min_reachable is not None:
         number, percent = min_reachable
         answer.require_reachable(number, percent=percent)
-    if fail_if_none_reachable:
+    if fail_if_none:
         answer.require_reachable(1)
 
 

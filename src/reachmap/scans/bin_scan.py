@@ -28,7 +28,7 @@ from reachmap.scans.bin_roadmap import (
     grasp_grid,
     join_components,
 )
-from reachmap.scans.cycle.planning import CycleKnowledge, CyclePlanner
+from reachmap.scans.cycle.planning import CycleKnowledge, CyclePlan, CyclePlanner
 from reachmap.scans.cycle.results import CycleResults
 from reachmap.scans.cycle.scenes import CycleScenes, stages_of
 from reachmap.scans.cycle.stages import whole_cycles
@@ -273,9 +273,6 @@ def _results(
             approach = way_in.path[way_in.planned - 1 :]
             plan = PlanResult.without_search(path)
             numbers_of_own[0] = meter.measured(plan, approach)
-    paths = [(way.path, way.planned, way.repeat, 0) for way in found]
-    for stage, (path, planned) in enumerate(() if after is None else after.paths):
-        paths.append((path, planned, -1, stage + 1))
     connected = known.routes.over_roadmap(survey, grasp) is not None
     return GraspResults(
         status=np.array([_status(survey, grasp, found=bool(found))], np.uint8),
@@ -295,16 +292,28 @@ def _results(
         margins=np.array(
             [[np.nan] * 4 if best is None else margins.of_path(*best[:2])]
         ),
-        configuration=np.vstack(
-            [np.zeros((0, scene.robot.dof)), *(entry[0] for entry in paths)]
-        ),
-        row_size=np.array([len(entry[0]) for entry in paths], np.int64),
-        planned_size=np.array([entry[1] for entry in paths], np.int64),
-        place=np.array([(0, entry[2]) for entry in paths], np.int64).reshape(-1, 2),
-        stage=np.array([entry[3] for entry in paths], np.uint8),
+        **_kept_paths(found, after, scene.robot.dof),
         best_repeat=np.array([NO_PATH if best is None else best.repeat], np.int64),
         cycle=None if after is None else CycleResults.of([after]),
     )
+
+
+def _kept_paths(
+    found: Sequence[WayIn], after: CyclePlan | None, dof: int
+) -> dict[str, Any]:
+    """Fields of the results: ways in, then the later stages of the cycle."""
+    paths = [(way.path, way.planned, way.repeat, 0) for way in found]
+    for stage, (path, planned) in enumerate(() if after is None else after.paths):
+        paths.append((path, planned, -1, stage + 1))
+    return {
+        "configuration": np.vstack(
+            [np.zeros((0, dof)), *(entry[0] for entry in paths)]
+        ),
+        "row_size": np.array([len(entry[0]) for entry in paths], np.int64),
+        "planned_size": np.array([entry[1] for entry in paths], np.int64),
+        "place": np.array([(0, entry[2]) for entry in paths], np.int64).reshape(-1, 2),
+        "stage": np.array([entry[3] for entry in paths], np.uint8),
+    }
 
 
 def _per_attempt(

@@ -125,20 +125,25 @@ def run_pipeline(
         ),
         lambda options: bin_scan(placement, bin_map, run=options),
     )
+    page = _told(folder, grasps, redraw=bool(chain.made))
+    return PipelineAnswer(made=tuple(chain.made), kept=tuple(chain.kept), report=page)
+
+
+def _told(folder: Path, grasps: Sequence[str | Path], *, redraw: bool) -> Path:
+    """Draw the maps of a folder, rank grasps with them, and report; the page."""
     pictures = folder / "pictures"
-    if chain.made or not pictures.exists():
-        for path in (workspace, placement, bin_map):
-            heatmap(path, output=pictures, overwrite=True)
+    if redraw or not pictures.exists():
+        for name in MAPS:
+            heatmap(folder / name, output=pictures, overwrite=True)
     if grasps:
         rank(
             grasps,
-            map_path=bin_map,
+            map_path=folder / MAPS[-1],
             output=folder / "ranked.json",
             chart=folder / "ranking.png",
             overwrite=True,
         )
-    page = report(folder, output=folder / "report.html", overwrite=True)
-    return PipelineAnswer(made=tuple(chain.made), kept=tuple(chain.kept), report=page)
+    return report(folder, output=folder / "report.html", overwrite=True)
 
 
 class _Chain:

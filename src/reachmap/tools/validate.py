@@ -162,17 +162,20 @@ def validate(
     attempts = _attempts(context)
     measure = plan_picks_over_routes if attempts == "roadmap" else plan_picks
     results = measure(context, run, progress=Progress("validate", quiet=run.quiet))
+    judged = [
+        judge_list(label, one, ranker, bin_map, results.take(rows))
+        for label, one, rows in zip(
+            _labels(ranked), ranked, _rows_of(ranked), strict=True
+        )
+    ]
     cycles = None
     if bin_map.cycle is not None:
-        progress = Progress("cycles", quiet=run.quiet)
-        cycles = plan_cycles(context, run, progress=progress)
-    judged = []
-    for label, one, rows in zip(_labels(ranked), ranked, _rows_of(ranked), strict=True):
-        own = judge_list(label, one, ranker, bin_map, results.take(rows))
-        if cycles is not None:
-            seen = judge_cycles(one, ranker, asked, cycles.take(rows))
-            own = replace(own, cycles=seen)
-        judged.append(own)
+        cycles = plan_cycles(context, run, progress=Progress("cycles", quiet=run.quiet))
+    if cycles is not None:
+        judged = [
+            replace(own, cycles=judge_cycles(one, ranker, asked, cycles.take(rows)))
+            for own, one, rows in zip(judged, ranked, _rows_of(ranked), strict=True)
+        ]
     validation = summarise(
         judged,
         top=top,
@@ -185,10 +188,7 @@ def validate(
     if calibration is not None:
         _calibrate(validation, calibration, overwrite=run.overwrite)
     _write(validation, output, chart, context.body_pairs, run.overwrite)
-    return ValidateAnswer(
-        validation=validation,
-        facts=facts_of(validation),
-    )
+    return ValidateAnswer(validation=validation, facts=facts_of(validation))
 
 
 def _attempts(context: PickContext) -> str:
