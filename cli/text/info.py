@@ -19,7 +19,7 @@ from reachmap.cli.text.robustness import robustness_lines
 from reachmap.cli.text.study import study_lines
 from reachmap.cli.text.tables import fact_lines, table_lines
 from reachmap.maps.bytes.to_json import flat_json
-from reachmap.maps.format.placement import is_turn
+from reachmap.maps.format.candidates import is_turn
 from reachmap.maps.robustness.summary import RobustnessSummary
 from reachmap.maps.summary.base import BaseSummary
 from reachmap.maps.summary.bin import BinSummary

@@ -10,9 +10,17 @@ import numpy as np
 from reachmap.maps.base.record import BasePlacement
 from reachmap.maps.bytes.tree import Tree
 from reachmap.maps.format.assembly import assemble, origin_of
+from reachmap.maps.format.candidates import (
+    REASON,
+    margin_variables,
+    of_candidate,
+    packed,
+    reason_problems,
+    row_problems,
+    unpacked,
+)
 from reachmap.maps.format.checks import check_pose, require
 from reachmap.maps.format.layout import JOINT, PERCENT, SCAN, Layout, Variable, index
-from reachmap.maps.format.placement import is_turn
 from reachmap.maps.format.store import RecordFile
 
 PERCENTAGES: Final = {
@@ -21,6 +29,7 @@ PERCENTAGES: Final = {
     "worst_point": "Path reachability of the worst point of the pick volume.",
     "reachable_share": "Share of test grasps with inverse kinematics.",
 }
+OFF: Final = "How far the base may be off before the score drops 5 points."
 POSES: Final = {
     "base_pose": "T_world_base of the chosen place.",
     "bin_pose": "T_world_bin, which stays.",
@@ -35,13 +44,10 @@ _ARRAYS: Final = (
 
 def check_base(tree: Tree) -> list[str]:
     """Check rows, reasons against missing scores, and bounds."""
-    score, reason = tree.array("score"), tree.array("reason")
+    score = tree.array("score")
     problems = [
         *(text for name in POSES for text in check_pose(tree.array(name))),
-        *require(
-            np.isnan(score) == (reason != 0),
-            "reason must be given exactly where a candidate has no score",
-        ),
+        *reason_problems(tree),
         *require(
             np.isnan(score) | (score <= tree.array("reachable_share") + 1e-6),
             "score must not exceed reachable_share",
@@ -50,12 +56,7 @@ def check_base(tree: Tree) -> list[str]:
             tree.array("best_of") < len(score), "best_of must be rows of the candidates"
         ),
     ]
-    for name, least in (("chosen", 0), ("runner_up", -1), ("present", -1)):
-        row = tree.attributes.get(name)
-        if not isinstance(row, int) or not least <= row < len(score):
-            problems.append(
-                f"the root attribute {name} must be a row of the candidates"
-            )
+    problems += row_problems(tree, {"chosen": 0, "runner_up": -1, "present": -1})
     if not problems:
         chosen = tree.attributes["chosen"]
         place = tree.array("candidate_position")[chosen]
@@ -67,17 +68,6 @@ def check_base(tree: Tree) -> list[str]:
         if not tree.array("exact")[chosen]:
             problems.append("the chosen candidate must be exact")
     return problems
-
-
-def _of_candidate(path: str, dtype: str, units: str, meaning: str, **more: Any) -> Any:
-    return Variable(
-        path=path,
-        dims=("candidate",),
-        dtype=dtype,
-        units=units,
-        meaning=meaning,
-        **more,
-    )
 
 
 BASE: Final = Layout(
@@ -126,8 +116,8 @@ BASE: Final = Layout(
             meaning="Best candidate of each arm and mounting, -1: none.",
             low=-1,
         ),
-        _of_candidate("arm", "i4", "1", "Arm.", low=0, labels="arms", is_index=True),
-        _of_candidate(
+        of_candidate("arm", "i4", "1", "Arm.", low=0, labels="arms", is_index=True),
+        of_candidate(
             "mounting", "i4", "1", "Mounting.", low=0, labels="mountings", is_index=True
         ),
         Variable(
@@ -138,7 +128,7 @@ BASE: Final = Layout(
             meaning="Place of robot_base; on a rail the joint's position, and zeros.",
             frame="world",
         ),
-        _of_candidate(
+        of_candidate(
             "candidate_yaw",
             "f8",
             "rad",
@@ -146,59 +136,32 @@ BASE: Final = Layout(
             frame="world",
         ),
         *(
-            _of_candidate(name, "f8", meaning=meaning, nan=True, **PERCENT)
+            of_candidate(name, "f8", meaning=meaning, nan=True, **PERCENT)
             for name, meaning in PERCENTAGES.items()
         ),
-        _of_candidate(
+        of_candidate(
             "exact", "u1", "1", "1 where paths were planned, 0: a bound.", is_flag=True
         ),
-        _of_candidate(
-            "reason",
-            "i4",
-            "1",
-            "Why the candidate is excluded, an index into reasons; 0: it is not.",
-            low=0,
-            labels="reasons",
-            is_index=True,
-        ),
-        *(
-            Variable(
-                path=f"{name}_margin",
-                dims=(name,),
-                dtype="f8",
-                units=units,
-                meaning="How far the base may be off before the score drops 5 points.",
-                low=0.0,
-            )
-            for name, units in (("shift", "m"), ("turn", "rad"))
-        ),
+        REASON,
+        *margin_variables(OFF, OFF),
     ),
 )
 
 
 def tree_from_base(record: BasePlacement) -> Tree:
     """Everything that the file will hold."""
-    reasons = ("", *sorted(set(record.reason) - {""}))
-    shift = {k: v for k, v in record.margin.items() if not is_turn(k)}
-    turn = {k: v for k, v in record.margin.items() if is_turn(k)}
+    of_reasons, labels = packed(record)
     arrays: dict[str, Any] = {name: getattr(record, name) for name in _ARRAYS}
-    arrays |= {
-        "reason": np.array([reasons.index(text) for text in record.reason], np.int64),
-        "shift_margin": np.array(list(shift.values()), float),
-        "turn_margin": np.array(list(turn.values()), float),
-    }
     rows = {name: int(getattr(record, name)) for name in _ROWS}
     return assemble(
         BASE,
-        arrays=arrays,
+        arrays=arrays | of_reasons,
         attributes={**rows, "rail": record.rail},
         labels={
             "joint_names": record.joint_names,
             "arms": record.arms,
             "mountings": record.mountings,
-            "reasons": reasons,
-            "shift_directions": tuple(shift),
-            "turn_directions": tuple(turn),
+            **labels,
         },
         stamp=record.stamp,
         provenance=record.provenance,
@@ -214,18 +177,10 @@ def base_from_tree(tree: Tree, path: Path) -> BasePlacement:
         name: tuple(tree.attributes[name])
         for name in ("joint_names", "arms", "mountings")
     }
-    margin: dict[str, float] = {}
-    for name in ("shift", "turn"):
-        directions = tree.leaves[name].attributes[f"{name}_directions"]
-        margin |= dict(
-            zip(directions, tree.array(f"{name}_margin").tolist(), strict=True)
-        )
-    reasons = tree.attributes["reasons"]
     return BasePlacement(
         **fields,
         rail=str(tree.attributes["rail"]),
-        reason=tuple(str(reasons[code]) for code in tree.array("reason")),
-        margin=margin,
+        **unpacked(tree),
         **origin_of(tree, path),
     )
 

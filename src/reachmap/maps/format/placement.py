@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +14,15 @@ from reachmap.maps.format.assembly import (
     section_arrays,
     sections_of,
 )
+from reachmap.maps.format.candidates import (
+    REASON,
+    margin_variables,
+    of_candidate,
+    packed,
+    reason_problems,
+    row_problems,
+    unpacked,
+)
 from reachmap.maps.format.checks import check_pose, check_world, require
 from reachmap.maps.format.layout import JOINT, PERCENT, SCAN, Layout, Variable, index
 from reachmap.maps.format.sections import PLACEMENT_SECTIONS
@@ -24,7 +32,7 @@ from reachmap.maps.records import BinPlacement
 
 def check_placement(tree: Tree) -> list[str]:
     """Check the chosen row against the pose, and reasons against missing scores."""
-    score, reason = tree.array("score"), tree.array("reason")
+    score = tree.array("score")
     problems = [*check_pose(tree.array("bin_pose")), *check_world(tree)]
     for name in ("worst_score", "score_error"):
         if name in tree.leaves:
@@ -32,34 +40,13 @@ def check_placement(tree: Tree) -> list[str]:
                 ~np.isnan(score) | np.isnan(tree.array(name)),
                 f"{name} must be NaN where a candidate has no score",
             )
-    for name, least in (("chosen", 0), ("runner_up", -1), ("paper_choice", -1)):
-        row = tree.attributes.get(name)
-        if not isinstance(row, int) or not least <= row < len(score):
-            problems.append(
-                f"the root attribute {name} must be a row of the candidates"
-            )
-    problems += require(
-        np.isnan(score) == (reason != 0),
-        "reason must be given exactly where a candidate has no score",
-    )
+    problems += row_problems(tree, {"chosen": 0, "runner_up": -1, "paper_choice": -1})
+    problems += reason_problems(tree)
     if not problems:
         chosen = tree.array("candidate_position")[tree.attributes["chosen"]]
         if not np.allclose(chosen, tree.array("bin_pose")[:3, 3], atol=1e-6):
             problems.append("bin_pose must be the pose of the chosen candidate")
     return problems
-
-
-def _per_candidate(
-    name: str, dtype: str, units: str, meaning: str, **more: Any
-) -> Variable:
-    return Variable(
-        path=name,
-        dims=("candidate",),
-        dtype=dtype,
-        units=units,
-        meaning=meaning,
-        **more,
-    )
 
 
 PLACEMENT = Layout(
@@ -102,65 +89,45 @@ PLACEMENT = Layout(
             meaning="Centre of the bin's inner bottom.",
             frame="robot_base",
         ),
-        _per_candidate(
+        of_candidate(
             "candidate_yaw",
             "f8",
             "rad",
             "Angle of the bin about the vertical.",
             frame="robot_base",
         ),
-        _per_candidate(
+        of_candidate(
             "score",
             "f8",
             meaning="Mean path reachability over the pick volume; NaN: excluded.",
             nan=True,
             **PERCENT,
         ),
-        _per_candidate(
+        of_candidate(
             "worst_point",
             "f8",
             meaning="Path reachability of the worst point of the pick volume.",
             nan=True,
             **PERCENT,
         ),
-        _per_candidate(
+        of_candidate(
             "reachable_share",
             "f8",
             meaning="Share of test frames that can be reached.",
             nan=True,
             **PERCENT,
         ),
-        _per_candidate(
+        of_candidate(
             "exact",
             "u1",
             "1",
             "1 where the bin was in the scene, 0 where the map was interpolated.",
             is_flag=True,
         ),
-        _per_candidate(
-            "reason",
-            "i4",
-            "1",
-            "Why the candidate is excluded, an index into reasons; 0: it is not.",
-            low=0,
-            labels="reasons",
-            is_index=True,
-        ),
-        Variable(
-            path="shift_margin",
-            dims=("shift",),
-            dtype="f8",
-            units="m",
-            meaning="How far the bin can be moved before the score drops by 5 points.",
-            low=0.0,
-        ),
-        Variable(
-            path="turn_margin",
-            dims=("turn",),
-            dtype="f8",
-            units="rad",
-            meaning="How far the bin can be turned before the score drops by 5 points.",
-            low=0.0,
+        REASON,
+        *margin_variables(
+            "How far the bin can be moved before the score drops by 5 points.",
+            "How far the bin can be turned before the score drops by 5 points.",
         ),
     ),
 )
@@ -175,17 +142,13 @@ _ROWS = ("chosen", "runner_up", "paper_choice")
 
 def tree_from_placement(record: BinPlacement) -> Tree:
     """Everything that the file will hold."""
-    reasons = ("", *sorted(set(record.reason) - {""}))
-    shift = {k: v for k, v in record.margin.items() if not is_turn(k)}
-    turn = {k: v for k, v in record.margin.items() if is_turn(k)}
+    of_reasons, labels = packed(record)
     poses, T = np.reshape(record.candidate_pose, (-1, 4)), record.T_base_level
     arrays: dict[str, Any] = {name: getattr(record, name) for name in _ARRAYS}
     arrays.update(
         candidate_position=poses[:, :3] @ T[:3, :3].T + T[:3, 3],
         candidate_yaw=poses[:, 3],
-        reason=np.array([reasons.index(text) for text in record.reason], np.int64),
-        shift_margin=np.array(list(shift.values()), float),
-        turn_margin=np.array(list(turn.values()), float),
+        **of_reasons,
     )
     layout = PLACEMENT.in_frame("T_base_level", T, ("candidate_yaw",), "level")
     optional, lists, numbers = section_arrays(layout, record)
@@ -199,9 +162,7 @@ def tree_from_placement(record: BinPlacement) -> Tree:
         },
         labels={
             "joint_names": record.joint_names,
-            "reasons": reasons,
-            "shift_directions": tuple(shift),
-            "turn_directions": tuple(turn),
+            **labels,
             "tolerance_parts": ("shift_m", "turn_rad"),
             **lists,
         },
@@ -213,14 +174,8 @@ def tree_from_placement(record: BinPlacement) -> Tree:
     )
 
 
-def is_turn(direction: str) -> bool:
-    """Whether a direction of the margin is an angle, as "+yaw" is."""
-    return direction.lstrip("+-") in ("roll", "pitch", "yaw")
-
-
 def placement_from_tree(tree: Tree, path: Path) -> BinPlacement:
     """Turn a checked tree into a record; ``path`` is named in messages."""
-    reasons = tree.attributes["reasons"]
     stored: dict[str, Any] = {name: tree.array(name) for name in _ARRAYS}
     stored.update({name: int(tree.attributes[name]) for name in _ROWS})
     optional = sections_of(PLACEMENT, tree)
@@ -232,19 +187,12 @@ def placement_from_tree(tree: Tree, path: Path) -> BinPlacement:
         **stored,
         rule=str(tree.attributes["rule"]),
         candidate_pose=np.column_stack([position, tree.array("candidate_yaw")]),
-        reason=tuple(str(reasons[code]) for code in tree.array("reason")),
-        margin={**_margin(tree, "shift"), **_margin(tree, "turn")},
+        **unpacked(tree),
         joint_names=tuple(tree.attributes["joint_names"]),
         **origin_of(tree, path),
         support=tree.text("support") if "support" in tree.leaves else None,
         **optional,
     )
-
-
-def _margin(tree: Tree, name: str) -> Mapping[str, float]:
-    directions = tree.leaves[name].attributes[f"{name}_directions"]
-    values = tree.array(f"{name}_margin").tolist()
-    return dict(zip(directions, values, strict=True))
 
 
 _FILE = RecordFile(

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from reachmap._typing import FloatArray
-from reachmap.maps.format.placement import is_turn
+from reachmap.maps.format.candidates import is_turn
 from reachmap.maps.records import BinPlacement
 
 
