@@ -114,6 +114,12 @@ def with_bin(overrides: tuple[str, ...], name: str | None) -> tuple[str, ...]:
     return overrides if name is None else (*overrides, f"pick_from={name}")
 
 
+keep_scan_option = _option(
+    "--keep-scan-configuration",
+    is_flag=True,
+    help="Leave the cell's own scan configuration.",
+)
+
 seed_option = _option(
     "--seed",
     type=click.IntRange(min=0),

@@ -13,6 +13,7 @@ from reachmap.cli.options import (
     OUTPUT_PATH,
     bin_option,
     compose,
+    keep_scan_option,
     output_option,
     run_options,
     seed_option,
@@ -111,11 +112,7 @@ region_options = compose(
     help="Choose for the worst case while the bin is off by this [m, deg]; 0 0 for the "
     "pose itself. Default: the cell's placement.tolerance.",
 )
-@click.option(
-    "--keep-scan-configuration",
-    is_flag=True,
-    help="Leave the cell's own scan configuration.",
-)
+@keep_scan_option
 @click.option(
     "--picture",
     type=OUTPUT_PATH,

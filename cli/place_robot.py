@@ -13,6 +13,7 @@ from reachmap.cli.options import (
     OUTPUT_PATH,
     cell_argument,
     compose,
+    keep_scan_option,
     output_option,
     run_options,
     seed_option,
@@ -102,11 +103,7 @@ places_options = compose(
     metavar="N",
     help="Different places to plan paths from.",
 )
-@click.option(
-    "--keep-scan-configuration",
-    is_flag=True,
-    help="Leave the cell's own scan configuration.",
-)
+@keep_scan_option
 @click.option(
     "--picture",
     type=OUTPUT_PATH,

@@ -19,7 +19,7 @@ from reachmap.core.collision.bin_fit import BinFit
 from reachmap.core.scene import Scene
 from reachmap.geometry import yaw_transform
 from reachmap.maps.records import WorkspaceMap
-from reachmap.placement.mapped.candidates import Candidate
+from reachmap.placement.mapped.candidates import Candidate, mapped_candidates
 from reachmap.placement.mapped.evaluator import Evaluator
 from reachmap.placement.mapped.exact import ALWAYS, Pose, bin_at
 from reachmap.placement.mapped.imaging import (
@@ -155,13 +155,7 @@ class Question:
         configuration come with the reason.
         """
         found = self.evaluator.evaluate(poses, self.start, above=above)
-        return [
-            Candidate(
-                pose=pose, score=e.score, exact=e.score is not None, reason=e.reason
-            )
-            for pose, e in zip(poses, found, strict=True)
-            if e.score is not None or e.reason
-        ]
+        return mapped_candidates(poses, found)
 
     def predicted(self) -> list[Candidate]:
         """Best pose at each place, by interpolation of the map."""

@@ -21,7 +21,7 @@ from reachmap.cell.loaded import LoadedCell
 from reachmap.cell.loading import cell_path, read_cell
 from reachmap.core.kinematics.kinematics import Kinematics
 from reachmap.errors import SettingsError
-from reachmap.maps import RunClock, check_outputs, publish
+from reachmap.maps import RunClock, check_outputs
 from reachmap.maps.base.format import write_base
 from reachmap.maps.base.record import BasePlacement
 from reachmap.maps.bytes.publish import check_picture
@@ -318,12 +318,12 @@ def _choice_settings(choice: RobotChoice) -> dict[str, Any]:
 
 def _draw(path: Path, placement: BasePlacement, run: RunOptions) -> None:
     from reachmap.plots.base import draw_base
-    from reachmap.plots.parts.style import figure_bytes
+    from reachmap.plots.parts.files import write_picture
 
-    data = figure_bytes(
+    write_picture(
+        path,
         draw_base(placement),
-        "svg" if path.suffix == ".svg" else "png",
         title="Where the arm goes",
         config_sha256=placement.stamp.config_sha256,
+        overwrite=run.overwrite,
     )
-    publish(path, [data], overwrite=run.overwrite)

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 from reachmap._typing import FloatArray
 from reachmap.core.collision.camera import Camera
 from reachmap.geometry import inverse_transform
-from reachmap.maps import publish
 from reachmap.placement.mapped.viewpoints import picture_corners
 from reachmap.runtime.options import RunOptions
 
@@ -18,20 +17,20 @@ if TYPE_CHECKING:
 
 def draw_placed(path: Path, placed: PlacedBin, run: RunOptions) -> None:
     """Draw a placement to a .png or .svg file."""
-    from reachmap.plots.parts.style import figure_bytes
+    from reachmap.plots.parts.files import write_picture
     from reachmap.plots.placement import draw_placement
 
     placement = placed.placement
     figure = draw_placement(
         placement, placed.workspace, camera_view=_camera_view(placed)
     )
-    data = figure_bytes(
+    write_picture(
+        path,
         figure,
-        "svg" if path.suffix == ".svg" else "png",
         title="Where the bin goes",
         config_sha256=placement.stamp.config_sha256,
+        overwrite=run.overwrite,
     )
-    publish(path, [data], overwrite=run.overwrite)
 
 
 def _camera_view(placed: PlacedBin) -> FloatArray | None:

@@ -7,10 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from reachmap.errors import SettingsError
-from reachmap.maps.bytes.publish import publish
 from reachmap.maps.records import BinMap, WorkspaceMap
 from reachmap.plots.albums import bin_album, workspace_album
-from reachmap.plots.parts.files import Picture
+from reachmap.plots.parts.files import Picture, write_picture
 from reachmap.plots.parts.levels import QUANTITIES
 from reachmap.plots.parts.style import figure_bytes
 
@@ -29,20 +28,18 @@ class Drawn:
     config_sha256: str
 
     def _repr_png_(self) -> bytes:
-        return self._bytes("png")
+        return figure_bytes(
+            self.figure, "png", title=self.title, config_sha256=self.config_sha256
+        )
 
     def save(self, path: str | Path, *, overwrite: bool = False) -> Path:
         """Write it; the suffix, .svg or any other, says how."""
-        svg = Path(path).suffix == ".svg"
-        data = self._bytes("svg") if svg else self._bytes("png")
-        return publish(Path(path), [data], overwrite=overwrite)
-
-    def _bytes(self, kind: str) -> bytes:
-        return figure_bytes(
+        return write_picture(
+            Path(path),
             self.figure,
-            "svg" if kind == "svg" else "png",
             title=self.title,
             config_sha256=self.config_sha256,
+            overwrite=overwrite,
         )
 
 

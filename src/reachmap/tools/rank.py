@@ -11,7 +11,7 @@ from typing import Any
 from reachmap.disk import as_path
 from reachmap.errors import GateFailedError, MapFileError, SettingsError
 from reachmap.maps import read_bin_map
-from reachmap.maps.bytes.publish import check_outputs, check_picture, publish
+from reachmap.maps.bytes.publish import check_outputs, check_picture
 from reachmap.maps.records import BinMap
 from reachmap.ranking.answers.explain import explanation, find_grasp
 from reachmap.ranking.answers.files import joined, targets_of, write_lists
@@ -273,7 +273,7 @@ def _draw(
     overwrite: bool,
 ) -> None:
     # Imported here: drawing takes longer than ranking.
-    from reachmap.plots.parts.style import figure_bytes
+    from reachmap.plots.parts.files import write_picture
     from reachmap.plots.ranking import CostGroup, ranking_chart
 
     groups = [
@@ -283,13 +283,13 @@ def _draw(
     figure = ranking_chart(
         groups, tuple(ranked[0].terms()), top, subtitle=_subtitle(ranked)
     )
-    data = figure_bytes(
+    write_picture(
+        chart,
         figure,
-        "svg" if chart.suffix == ".svg" else "png",
         title="Mean cost of the first grasps",
         config_sha256=config_sha256,
+        overwrite=overwrite,
     )
-    publish(chart, [data], overwrite=overwrite)
 
 
 def _subtitle(ranked: Sequence[RankedList]) -> str:

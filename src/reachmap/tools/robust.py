@@ -17,7 +17,6 @@ from reachmap.maps import (
     Stamp,
     check_outputs,
     config_sha256,
-    publish,
     read_bin_map,
 )
 from reachmap.maps.bytes.publish import check_picture
@@ -183,12 +182,12 @@ def _record(
 
 def _draw(path: Path, record: Robustness, run: RunOptions) -> None:
     from reachmap.plots.curves.robustness import draw_robustness
-    from reachmap.plots.parts.style import figure_bytes
+    from reachmap.plots.parts.files import write_picture
 
-    data = figure_bytes(
+    write_picture(
+        path,
         draw_robustness(record),
-        "svg" if path.suffix == ".svg" else "png",
         title="Reachability over the errors of the cell",
         config_sha256=record.stamp.config_sha256,
+        overwrite=run.overwrite,
     )
-    publish(path, [data], overwrite=run.overwrite)

@@ -347,13 +347,13 @@ def _write(
         publish(output, [text.encode("ascii"), b"\n"], overwrite=overwrite)
     if chart is not None:
         # Imported here: drawing is asked for seldom.
-        from reachmap.plots.parts.style import figure_bytes
+        from reachmap.plots.parts.files import write_picture
         from reachmap.plots.validation import validation_chart
 
-        data = figure_bytes(
+        write_picture(
+            chart,
             validation_chart(validation),
-            "svg" if chart.suffix == ".svg" else "png",
             title="Predicted by the map and found by planning",
             config_sha256=str(validation.settings["map_sha256"]),
+            overwrite=overwrite,
         )
-        publish(chart, [data], overwrite=overwrite)

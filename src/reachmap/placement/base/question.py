@@ -12,7 +12,7 @@ from reachmap._typing import BoolArray, FloatArray
 from reachmap.errors import CellError
 from reachmap.placement.base.fit import BaseFit
 from reachmap.placement.base.mounting import AnyMounting
-from reachmap.placement.mapped.candidates import Candidate
+from reachmap.placement.mapped.candidates import Candidate, mapped_candidates
 from reachmap.placement.mapped.evaluator import Evaluator
 from reachmap.placement.mapped.exact import ALWAYS, NEVER, PlacedScene, Pose, PoseScore
 from reachmap.placement.mapped.imaging import imaging_configurations
@@ -144,10 +144,4 @@ class BaseQuestion:
     ) -> list[Candidate]:
         """Map poses; those whose bound is not above a score are left out."""
         found = self.evaluator.evaluate(poses, self.start, above=above)
-        return [
-            Candidate(
-                pose=pose, score=e.score, exact=e.score is not None, reason=e.reason
-            )
-            for pose, e in zip(poses, found, strict=True)
-            if e.score is not None or e.reason
-        ]
+        return mapped_candidates(poses, found)

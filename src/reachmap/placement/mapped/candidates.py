@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from reachmap._typing import CodeArray, FloatArray
-from reachmap.placement.mapped.exact import PoseScore
+from reachmap.placement.mapped.evaluator import Evaluation
+from reachmap.placement.mapped.exact import Pose, PoseScore
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,6 +34,17 @@ class Candidate:
     worst: float | None = None
     exact: bool = False
     reason: str = ""
+
+
+def mapped_candidates(
+    poses: Sequence[Pose], found: Sequence[Evaluation]
+) -> list[Candidate]:
+    """Poses that were mapped, and those excluded for a reason; the rest is left out."""
+    return [
+        Candidate(pose=pose, score=e.score, exact=e.score is not None, reason=e.reason)
+        for pose, e in zip(poses, found, strict=True)
+        if e.score is not None or e.reason
+    ]
 
 
 @dataclass(slots=True, kw_only=True)

@@ -86,6 +86,26 @@ def write_all(
     return paths
 
 
+def write_picture(
+    path: Path,
+    figure: Figure,
+    *,
+    title: str,
+    config_sha256: str,
+    overwrite: bool = False,
+) -> Path:
+    """Write one figure; the suffix, .svg or any other, says how.
+
+    Raises
+    ------
+    OutputError
+        The file exists and ``overwrite`` is off, or it cannot be written.
+    """
+    kind: Format = "svg" if path.suffix == ".svg" else "png"
+    data = figure_bytes(figure, kind, title=title, config_sha256=config_sha256)
+    return publish(path, [data], overwrite=overwrite)
+
+
 def _make_folder(folder: Path) -> None:
     try:
         folder.mkdir(parents=True, exist_ok=True)
