@@ -47,9 +47,15 @@ def transform_from_parts(R: npt.ArrayLike, p: npt.ArrayLike) -> FloatArray:
 
 
 def axis_vector(axis: str) -> FloatArray:
-    """Unit vector of a signed axis, as in ``"-z"``, shape (3,)."""
+    """Unit vector of a signed axis, shape (3,).
+
+    >>> axis_vector("-z").tolist()
+    [0.0, 0.0, -1.0]
+    """
     column, sign = AXES[axis]
-    return np.asarray(sign * np.eye(3)[column])
+    vector = np.zeros(3)
+    vector[column] = sign
+    return vector
 
 
 def inverse_transform(T: FloatArray) -> FloatArray:

@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from reachmap.errors import MapFileError, SettingsError
 from reachmap.geometry import (
+    axis_vector,
     direction_angle,
     rotation_angle,
     rotation_from_quaternion_wxyz,
@@ -26,7 +27,7 @@ from reachmap.ranking import (
     align,
     rotation_between,
 )
-from reachmap.ranking.lookup.approach import axis_vector, tcp_rotation
+from reachmap.ranking.lookup.approach import tcp_rotation
 from reachmap.ranking.lookup.costs import outside_map
 from reachmap.ranking.lookup.order import stable_order
 from reachmap.ranking.lookup.table import quaternion_angle

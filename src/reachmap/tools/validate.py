@@ -155,27 +155,20 @@ def validate(
     if random is not None:
         drawn = random_grasps(bin_map, random, context.seed)
         ranked.append(rank_list(drawn, ranker, settings=settings))
-    context = replace(context, picks=join_picks([picks_of(one) for one in ranked]))
-    if not len(context.picks):
-        raise GraspListError("there are no grasps to plan to")
-    context = replace(context, body_pairs=tuple(pairs_of_fillings(context.loaded)))
+    context = _with_picks(context, ranked)
     attempts = _attempts(context)
     measure = plan_picks_over_routes if attempts == "roadmap" else plan_picks
     results = measure(context, run, progress=Progress("validate", quiet=run.quiet))
-    judged = [
-        judge_list(label, one, ranker, bin_map, results.take(rows))
-        for label, one, rows in zip(
-            _labels(ranked), ranked, _rows_of(ranked), strict=True
-        )
-    ]
     cycles = None
     if bin_map.cycle is not None:
         cycles = plan_cycles(context, run, progress=Progress("cycles", quiet=run.quiet))
-    if cycles is not None:
-        judged = [
-            replace(own, cycles=judge_cycles(one, ranker, asked, cycles.take(rows)))
-            for own, one, rows in zip(judged, ranked, _rows_of(ranked), strict=True)
-        ]
+    judged = []
+    for label, one, rows in zip(_labels(ranked), ranked, _rows_of(ranked), strict=True):
+        own = judge_list(label, one, ranker, bin_map, results.take(rows))
+        if cycles is not None:
+            seen = judge_cycles(one, ranker, asked, cycles.take(rows))
+            own = replace(own, cycles=seen)
+        judged.append(own)
     validation = summarise(
         judged,
         top=top,
@@ -189,6 +182,21 @@ def validate(
         _calibrate(validation, calibration, overwrite=run.overwrite)
     _write(validation, output, chart, context.body_pairs, run.overwrite)
     return ValidateAnswer(validation=validation, facts=facts_of(validation))
+
+
+def _with_picks(context: PickContext, ranked: Sequence[RankedList]) -> PickContext:
+    """The context with the grasps of all lists, and the pairs of its cell's bodies.
+
+    Raises
+    ------
+    GraspListError
+        There are none.
+    """
+    picks = join_picks([picks_of(one) for one in ranked])
+    if not len(picks):
+        raise GraspListError("there are no grasps to plan to")
+    pairs = tuple(pairs_of_fillings(context.loaded))
+    return replace(context, picks=picks, body_pairs=pairs)
 
 
 def _attempts(context: PickContext) -> str:

@@ -18,7 +18,7 @@ from reachmap.cell.model.fields import (
     Record,
     Shape,
 )
-from reachmap.cell.model.scans import CLEAR_RIM
+from reachmap.cell.model.scans import CLEAR_RIM, word_or_length
 
 Depth = Annotated[Coordinate, Field(ge=0)]
 
@@ -48,13 +48,9 @@ PartChoice = Annotated[
 ]
 
 
-def _word_or_length(value: object) -> str:
-    return "word" if isinstance(value, str) else "length"
-
-
 Height = Annotated[
     Annotated[Length, Tag("length")] | Annotated[Literal["clear_rim"], Tag("word")],
-    Discriminator(_word_or_length),
+    Discriminator(word_or_length),
 ]
 
 

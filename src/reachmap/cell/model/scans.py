@@ -93,13 +93,14 @@ PRESS_IN_M = 0.01
 CLEAR_RIM: Literal["clear_rim"] = "clear_rim"
 
 
-def _approach_kind(value: object) -> str:
+def word_or_length(value: object) -> str:
+    """Tag of what is a word, such as clear_rim, or a length: one message, not two."""
     return "word" if isinstance(value, str) else "length"
 
 
 Approach = Annotated[
     Annotated[Height, Tag("length")] | Annotated[Literal["clear_rim"], Tag("word")],
-    Discriminator(_approach_kind),
+    Discriminator(word_or_length),
 ]
 
 

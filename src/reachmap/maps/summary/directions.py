@@ -105,13 +105,14 @@ def reached_shares(record: BinMap) -> ReachedShares:
     tried = record.status != Status.NOT_ATTEMPTED
     found = record.status == Status.PATH_FOUND
     return ReachedShares(
-        frames=_mean(np.where(tried, 100.0 * found, np.nan)),
-        directions=_mean(directions),
-        points=_mean(points),
+        frames=mean_of_known(np.where(tried, 100.0 * found, np.nan)),
+        directions=mean_of_known(directions),
+        points=mean_of_known(points),
     )
 
 
-def _mean(values: FloatArray) -> float:
+def mean_of_known(values: FloatArray) -> float:
+    """Mean of what is not NaN; NaN where nothing is known."""
     known = values[~np.isnan(values)]
     return float(known.mean()) if known.size else float("nan")
 

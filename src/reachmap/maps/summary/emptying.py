@@ -11,7 +11,7 @@ from reachmap._typing import BoolArray, FloatArray
 from reachmap.cell.model.cell import Cell
 from reachmap.geometry import inverse_transform
 from reachmap.maps.records import BinMap
-from reachmap.maps.summary.directions import reachability_of_directions
+from reachmap.maps.summary.directions import mean_of_known, reachability_of_directions
 
 # What stays is said to be in one place if this much of it is.
 MOST = 0.6
@@ -93,10 +93,10 @@ def emptying_of(record: BinMap) -> Emptying | None:
         EmptyingLevel(
             height_m=float(height),
             fill=float(height) / depth,
-            frames=_mean(record.path_reachability[k]),
-            directions=_mean(directions[k]),
-            points=_mean(points[k]),
-            cycle=None if cycle is None else _mean(cycle[k]),
+            frames=mean_of_known(record.path_reachability[k]),
+            directions=mean_of_known(directions[k]),
+            points=mean_of_known(points[k]),
+            cycle=None if cycle is None else mean_of_known(cycle[k]),
         )
         for k, height in enumerate(record.layer)
     )
@@ -133,11 +133,6 @@ def volume_left(stuck: BoolArray, layer: FloatArray, depth: float) -> FloatArray
     count = np.arange(1, len(layer) + 1)[:, None, None]
     highest = np.where(stuck, count, 0).max(axis=0)
     return np.asarray(share[highest])
-
-
-def _mean(values: FloatArray) -> float:
-    known = values[~np.isnan(values)]
-    return float(known.mean()) if known.size else float("nan")
 
 
 def _is_filled(record: BinMap) -> bool:

@@ -5,19 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from reachmap._typing import FloatArray
-from reachmap.geometry import AXES
-
-
-def axis_vector(axis: str) -> FloatArray:
-    """Return the unit vector of a signed axis name, shape (3,).
-
-    >>> axis_vector("-z").tolist()
-    [0.0, 0.0, -1.0]
-    """
-    index, sign = AXES[axis]
-    vector = np.zeros(3)
-    vector[index] = sign
-    return vector
+from reachmap.geometry import AXES, axis_vector
 
 
 def rotation_between(a: FloatArray, b: FloatArray) -> FloatArray:

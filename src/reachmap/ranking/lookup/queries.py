@@ -8,10 +8,11 @@ from numpy.typing import ArrayLike
 from reachmap._typing import BoolArray, FloatArray
 from reachmap.errors import SettingsError
 from reachmap.geometry import (
+    axis_vector,
     quaternion_wxyz_from_rotation,
     rotation_from_quaternion_wxyz,
 )
-from reachmap.ranking.lookup.approach import axis_vector, complete_rotation
+from reachmap.ranking.lookup.approach import complete_rotation
 from reachmap.ranking.lookup.matching import Queries
 from reachmap.ranking.lookup.settings import Invalid, Roll
 from reachmap.ranking.lookup.table import GraspTable

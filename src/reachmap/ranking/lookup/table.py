@@ -11,6 +11,7 @@ import numpy as np
 from reachmap._typing import BoolArray, CodeArray, FloatArray, IntArray
 from reachmap.errors import MapFileError
 from reachmap.geometry import (
+    axis_vector,
     direction_angle,
     inverse_transform,
     rotation_from_quaternion_wxyz,
@@ -18,7 +19,6 @@ from reachmap.geometry import (
 from reachmap.maps.bytes.hashing import canonical_array
 from reachmap.maps.parts import freeze
 from reachmap.maps.records import BinMap, Status
-from reachmap.ranking.lookup.approach import axis_vector
 from reachmap.ranking.lookup.settings import QUANTILE, CostBasis
 from reachmap.ranking.terms.margins import margin_terms, margin_values
 from reachmap.ranking.terms.seconds import CycleSeconds, cycle_seconds
