@@ -32,12 +32,12 @@ from reachmap.scans.bin_scan import pairs_of_fillings
 from reachmap.tools.prologue import refuse_cell_files
 from reachmap.tools.rank import ListFormat, ranker_of, read_list
 from reachmap.validation.calibration import calibrate as fit_calibration
-from reachmap.validation.cycle_planning import plan_cycles
+from reachmap.validation.cycle_planning import CycleResults, plan_cycles
 from reachmap.validation.cycles import judge_cycles, settings_in_j
 from reachmap.validation.facts import facts_of
-from reachmap.validation.judgement import judge_list
+from reachmap.validation.judgement import JudgedList, judge_list
 from reachmap.validation.picks import NO_PICKS, join_picks, picks_of
-from reachmap.validation.planning import PickContext, plan_picks
+from reachmap.validation.planning import PickContext, PickResults, plan_picks
 from reachmap.validation.random_grasps import random_grasps
 from reachmap.validation.routes import plan_picks_over_routes
 from reachmap.validation.summary import Validation, summarise
@@ -162,15 +162,8 @@ def validate(
     cycles = None
     if bin_map.cycle is not None:
         cycles = plan_cycles(context, run, progress=Progress("cycles", quiet=run.quiet))
-    judged = []
-    for label, one, rows in zip(_labels(ranked), ranked, _rows_of(ranked), strict=True):
-        own = judge_list(label, one, ranker, bin_map, results.take(rows))
-        if cycles is not None:
-            seen = judge_cycles(one, ranker, asked, cycles.take(rows))
-            own = replace(own, cycles=seen)
-        judged.append(own)
     validation = summarise(
-        judged,
+        _judged(ranked, ranker, bin_map, asked, results, cycles),
         top=top,
         settings={
             **_facts_of_settings(map_path, bin_map, settings, context, top),
@@ -182,6 +175,25 @@ def validate(
         _calibrate(validation, calibration, overwrite=run.overwrite)
     _write(validation, output, chart, context.body_pairs, run.overwrite)
     return ValidateAnswer(validation=validation, facts=facts_of(validation))
+
+
+def _judged(
+    ranked: Sequence[RankedList],
+    ranker: Ranker,
+    bin_map: BinMap,
+    asked: RankSettings,
+    results: PickResults,
+    cycles: CycleResults | None,
+) -> list[JudgedList]:
+    """Hold every list against what was planned to its grasps."""
+    judged = []
+    for label, one, rows in zip(_labels(ranked), ranked, _rows_of(ranked), strict=True):
+        own = judge_list(label, one, ranker, bin_map, results.take(rows))
+        if cycles is not None:
+            seen = judge_cycles(one, ranker, asked, cycles.take(rows))
+            own = replace(own, cycles=seen)
+        judged.append(own)
+    return judged
 
 
 def _with_picks(context: PickContext, ranked: Sequence[RankedList]) -> PickContext:
