@@ -1,25 +1,26 @@
 """Options that several commands share, as values, so that they read alike everywhere.
 
-====================  ======================================  =======================
-Option                Parameter of the command                Commands
-====================  ======================================  =======================
-``CELL``              ``cell: str``                           workspace-scan, check
-``--cell``            ``cell: str | None``                    bin-scan, rank
-``--bin``             ``bin_name: str | None``                place-bin, bin-scan
-``--set``             ``overrides: tuple[str, ...]``          all that read a cell
-``--seed``            ``seed: int | None``                    scans, validate
-``-j``, ``--workers`` ``workers: int``                        scans, place-bin
-``--executor``        ``executor: str``                       scans
-``--shard``           ``shard: tuple[int, int] | None``       scans
-``--restart``         ``restart: bool``                       scans
-``--dry-run``         ``dry_run: bool``                       scans
-``--progress``        ``progress: bool``                      scans, place-bin
-``-o``, ``--output``  ``output: Path`` (see output_option)    all that write
-``--overwrite``       ``overwrite: bool``                     all that write
-``--json``            ``as_json: bool``                       all that answer
-``-v``, ``-q``        none, kept by the group                 every command, by itself
-``--debug``           none, kept by the group                 every command, by itself
-====================  ======================================  =======================
+=============================  =================================  =====================
+Option                         Parameter of the command           Commands
+=============================  =================================  =====================
+``CELL``                       ``cell: str``                      workspace-scan, check
+``--cell``                     ``cell: str | None``               bin-scan, rank
+``--bin``                      ``bin_name: str | None``           place-bin, bin-scan
+``--keep-scan-configuration``  ``keep_scan_configuration: bool``  place-bin, place-robot
+``--set``                      ``overrides: tuple[str, ...]``     all that read a cell
+``--seed``                     ``seed: int | None``               scans, validate
+``-j``, ``--workers``          ``workers: int``                   scans, place-bin
+``--executor``                 ``executor: str``                  scans
+``--shard``                    ``shard: tuple[int, int] | None``  scans
+``--restart``                  ``restart: bool``                  scans
+``--dry-run``                  ``dry_run: bool``                  scans
+``--progress``                 ``progress: bool``                 scans, place-bin
+``-o``, ``--output``           ``output: Path``                   all that write
+``--overwrite``                ``overwrite: bool``                all that write
+``--json``                     ``as_json: bool``                  all that answer
+``-v``, ``-q``                 none, kept by the group            every command
+``--debug``                    none, kept by the group            every command
+=============================  =================================  =====================
 
 A value comes from the command line, else from the environment variable
 ``REACHMAP_<COMMAND>_<PARAMETER>`` (``REACHMAP_BIN_SCAN_WORKERS``), else, where the
