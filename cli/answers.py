@@ -8,6 +8,8 @@ from typing import Any
 
 import click
 
+from reachmap.cli.terminal import show
+
 
 def say(facts: Any, text: Callable[[], str], *, as_json: bool) -> None:
     """Print an answer.
@@ -26,4 +28,4 @@ def say(facts: Any, text: Callable[[], str], *, as_json: bool) -> None:
 
         click.echo(json.dumps(json_ready(facts), allow_nan=False))
     elif said := text():
-        click.echo(said.rstrip("\n"))
+        show(said.rstrip("\n"))

@@ -24,6 +24,7 @@ from typing import Any
 import click
 
 from reachmap.cli.streams import AnswerError, discard_stdout
+from reachmap.cli.terminal import program_name
 from reachmap.errors import MissingExtraError, OutputError, ReachmapError
 
 INTERNAL_ERROR = 70
@@ -90,7 +91,7 @@ def _report(lines: Iterable[str], state: RunState) -> None:
     if state.debug:
         traceback.print_exc()
     for line in lines:
-        click.echo(f"reachmap: {line}", err=True)
+        click.echo(f"{program_name('red')} {line}", err=True)
 
 
 def _missing_lines(error: Exception) -> list[str]:
@@ -116,5 +117,5 @@ def _interrupted(error: BaseException) -> int:
     cause = error.__cause__ if isinstance(error, click.Abort) else error
     message = str(cause or "").strip() or "interrupted"
     for line in message.splitlines():
-        click.echo(f"reachmap: {line}", err=True)
+        click.echo(f"{program_name('red')} {line}", err=True)
     return INTERRUPTED

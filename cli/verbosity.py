@@ -10,8 +10,10 @@ import click
 
 from reachmap import __version__
 from reachmap.cli.failures import RunState
+from reachmap.cli.terminal import program_name
 
 LEVELS = (logging.ERROR, logging.WARNING, logging.INFO, logging.DEBUG)
+COLOURS = {logging.WARNING: "yellow", logging.ERROR: "red"}
 NORMAL = LEVELS.index(logging.WARNING)
 ARGUMENTS = "reachmap.arguments"
 """Key of the words of the command line in the context: --version may stand first."""
@@ -26,15 +28,17 @@ class _StderrHandler(logging.StreamHandler):  # type: ignore[type-arg]
         self.stream = sys.stderr
         super().emit(record)
 
+    def format(self, record: logging.LogRecord) -> str:
+        """Begin with the name of the program, in the colour of the level."""
+        return f"{program_name(COLOURS.get(record.levelno))} {super().format(record)}"
+
 
 def configure_logging(verbosity: int) -> None:
     """Send the package's log to stderr; 0 shows warnings, each step shows more."""
     logger = logging.getLogger("reachmap")
     logger.setLevel(LEVELS[min(max(NORMAL + verbosity, 0), len(LEVELS) - 1)])
     if not any(isinstance(handler, _StderrHandler) for handler in logger.handlers):
-        handler = _StderrHandler()
-        handler.setFormatter(logging.Formatter("reachmap: %(message)s"))
-        logger.addHandler(handler)
+        logger.addHandler(_StderrHandler())
 
 
 def _count(ctx: click.Context, parameter: click.Parameter, value: int) -> None:

@@ -1,6 +1,9 @@
-"""Numbers and names as people read them, for messages, tables and pictures."""
+"""Numbers and names as people read them, in messages, tables, pictures; and where."""
 
 from __future__ import annotations
+
+import os
+from typing import TextIO
 
 ID_WIDTH = 16
 
@@ -24,3 +27,8 @@ def printable(text: str, width: int = ID_WIDTH) -> str:
     """Spell an id from a file so that it cannot disturb a terminal."""
     safe = text if text.isprintable() else ascii(text)[1:-1]
     return safe if len(safe) <= width else safe[: width - 1] + "…"
+
+
+def is_terminal(stream: TextIO) -> bool:
+    """Whether a stream leads to a terminal that knows more than letters."""
+    return stream.isatty() and os.environ.get("TERM") not in ("dumb", "unknown")

@@ -43,6 +43,7 @@ HOMES = {
     "h5py": ("reachmap.maps.bytes.",),
     "matplotlib": ("reachmap.plots.",),
     "click": ("reachmap.cli",),
+    "rich": ("reachmap.cli.terminal", "reachmap.runtime.progress"),
     "toppra": ("reachmap.core.planning.time_laws.optimal",),
     "viser": ("reachmap.view.",),
     "trimesh": ("reachmap.view.",),

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import io
+import re
 
 import pytest
 
@@ -34,8 +35,9 @@ def test_a_line_tells_share_success_rate_and_time_left(clock):
     """The line has the parts of the documentation's example, from plain arithmetic."""
     progress, _ = reporter(clock)
     progress.begin(7560)
-    clock.now += 60
-    progress.add(600, 558)
+    for _ in range(2):
+        clock.now += 30
+        progress.add(300, 279)
     assert progress.text() == (
         "bin-scan 600/7560 (7%) ok 93.0% 10/s elapsed 1:00 ETA 11:36"
     )
@@ -45,8 +47,9 @@ def test_resumed_frames_count_as_done_but_not_for_the_rate(clock):
     """Frames of an earlier run must not promise a speed that nobody sees."""
     progress, _ = reporter(clock)
     progress.begin(1000, done=800, ok=400)
-    clock.now += 10
-    progress.add(50, 50)
+    for _ in range(2):
+        clock.now += 5
+        progress.add(25, 25)
     assert progress.text() == (
         "bin-scan 850/1000 (85%) ok 52.9% 5/s elapsed 0:10 ETA 0:30"
     )
@@ -98,9 +101,9 @@ def test_a_terminal_gets_one_line_that_is_rewritten(clock):
     progress.end()
     text = stream.getvalue()
     assert text.count("\n") == 1
-    assert text.endswith("\n")
-    assert text.count("\r") <= 1 + 100 + 1
-    assert "[########################]" in text
+    assert 50 < text.count("\r") <= 1 + 100 + 2
+    assert "1000/1000 (100%)" in text
+    assert text.count("\x1b[?25l") == text.count("\x1b[?25h") == 1
 
 
 def test_a_bar_is_no_wider_than_the_terminal(clock, monkeypatch):
@@ -108,9 +111,43 @@ def test_a_bar_is_no_wider_than_the_terminal(clock, monkeypatch):
     monkeypatch.setenv("COLUMNS", "40")
     progress, stream = reporter(clock, terminal=True)
     progress.begin(10)
-    assert all(
-        len(part.removeprefix("\x1b[K")) < 40 for part in stream.getvalue().split("\r")
-    )
+    progress.end()
+    drawn = re.sub(r"\x1b\[[?0-9;]*[A-Za-z]", "", stream.getvalue())
+    parts = re.split(r"[\r\n]+", drawn)
+    assert any("bin-scan" in part for part in parts)
+    assert all(len(part) <= 40 for part in parts)
+
+
+@pytest.mark.parametrize(
+    ("rates", "even", "said"),
+    [
+        ((10, 10), True, True),
+        ((10, 15), True, True),
+        ((10, 30), True, False),  # speeding up: the last minute says little
+        ((30, 10), True, False),
+        ((10, 0), True, False),  # nothing has been done for half of the time
+        ((10, 10), False, False),  # the rest is known to take longer
+    ],
+)
+def test_time_left_is_said_where_it_means_something(clock, rates, even, said):
+    """While both halves of what was watched agree, and frames are alike."""
+    progress, _ = reporter(clock)
+    progress.begin(10_000, even=even)
+    for rate in rates:
+        for _ in range(20):
+            clock.now += 1
+            progress.add(rate, rate)
+    assert (" ETA " in progress.text()) is said
+
+
+def test_no_time_left_is_said_at_once(clock):
+    """The first seconds say nothing about the rest."""
+    progress, _ = reporter(clock)
+    progress.begin(10_000)
+    for _ in range(40):
+        clock.now += 0.1
+        progress.add(10, 10)
+    assert " ETA " not in progress.text()
 
 
 def test_quiet_says_nothing(clock):

@@ -73,10 +73,11 @@ def run(
         As for :func:`run_scan`.
     """
     progress.begin(len(units))
-    with stop_signals() as stop, open_pool(options) as pool:
-        payloads = compute(pool, job, units, progress, stop=stop, most=len(units))
-    progress.end()
-    return payloads
+    try:
+        with stop_signals() as stop, open_pool(options) as pool:
+            return compute(pool, job, units, progress, stop=stop, most=len(units))
+    finally:
+        progress.end()
 
 
 def compute(
@@ -274,7 +275,9 @@ class _Run:
 
     def progress(self, phase: str) -> Progress:
         """Report of a phase."""
-        label = self.label if phase == UNITS else f"{self.label} {phase}"
+        label = (
+            self.label if phase == UNITS else f"{self.label} {phase.replace('_', ' ')}"
+        )
         return Progress(label, quiet=self.options.quiet)
 
     def complete(

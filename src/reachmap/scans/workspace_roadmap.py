@@ -88,17 +88,19 @@ def connect_survey(
         Counts frames as they are reached.
     """
     progress = progress or Progress("", quiet=True)
-    progress.begin(len(np.unique(survey.frame)))
-    connection = connect(
-        scene.scan_configuration,
-        survey.roadmap_goals,
-        scene.motions,
-        scene.loaded.cell.roadmap,
-        seed=seed,
-        on_frame=lambda: progress.add(1, 1),
-    )
-    progress.end()
-    return connection
+    # Most frames are reached soon, some late and some never.
+    progress.begin(len(np.unique(survey.frame)), even=False)
+    try:
+        return connect(
+            scene.scan_configuration,
+            survey.roadmap_goals,
+            scene.motions,
+            scene.loaded.cell.roadmap,
+            seed=seed,
+            on_frame=lambda: progress.add(1, 1),
+        )
+    finally:
+        progress.end()
 
 
 def results_of_connection(survey: Survey, connection: Connection) -> FrameResults:

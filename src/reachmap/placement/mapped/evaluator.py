@@ -97,7 +97,7 @@ class Evaluator:
         if self._expects:
             self._progress.expect(self.mapped + poses)
         else:
-            self._progress.begin(poses)
+            self._progress.begin(poses, even=False)  # at most
             self._expects = True
 
     def evaluate(
@@ -184,8 +184,10 @@ def open_evaluator(
     context = (loaded, is_open, placing)
     job = Job(function=evaluate_unit, prepare=Prepared, context=context)
     with open_pool(options) as pool:
-        yield Evaluator(pool, job, progress)
-        progress.end()
+        try:
+            yield Evaluator(pool, job, progress)
+        finally:
+            progress.end()
 
 
 class Prepared:

@@ -1,0 +1,71 @@
+"""What a terminal shows besides the text itself: headings, verdicts, links.
+
+The text is the same to a letter. In pipes and files, on a dumb terminal, and where
+rich is not installed, it is all there is; NO_COLOR takes the colours away.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import sys
+from pathlib import Path
+from typing import Final
+
+import click
+
+from reachmap.text import is_terminal
+
+HEADING: Final = re.compile(r"^\S.*(?=\n +\S)", re.MULTILINE)
+GOOD: Final = re.compile(r"\b(path_found|path found|reachable|valid)\b")
+BAD: Final = re.compile(
+    r"\b(no_ik|ik_in_collision|no_path_found|no path found|unlike_map|outside_map"
+    r"|invalid|unreachable|error)\b"
+)
+PLACE: Final = re.compile(r"https?://\S+|[^\s:,;'\"]*[/.][^\s:,;'\"]*")
+
+
+def show(text: str) -> None:
+    """Print an answer on stdout, styled where a terminal reads it."""
+    if not (is_terminal(sys.stdout) and _show_styled(text)):
+        click.echo(text)
+
+
+def program_name(colour: str | None = None) -> str:
+    """The first word of messages on stderr, in a colour where a terminal has them."""
+    name = "reachmap:"
+    if colour is None or os.environ.get("NO_COLOR") or not is_terminal(sys.stderr):
+        return name
+    return click.style(name, fg=colour, bold=True)
+
+
+def _show_styled(text: str) -> bool:
+    """Print with rich; whether it is installed."""
+    try:
+        # Imported here: pipes need none of it.
+        from rich.console import Console
+        from rich.style import Style
+        from rich.text import Text
+    except ModuleNotFoundError:
+        return False
+    shown = Text(text)
+    shown.highlight_regex(HEADING, "bold")
+    shown.highlight_regex(GOOD, "green")
+    shown.highlight_regex(BAD, "red")
+    for match in PLACE.finditer(text):
+        if address := _address(match.group()):
+            shown.stylize(Style(link=address), *match.span())
+    # Not wrapped: the terminal does that, and what is copied is what was written.
+    Console(file=sys.stdout, highlight=False).print(shown, soft_wrap=True)
+    return True
+
+
+def _address(word: str) -> str:
+    """Where a word leads: to a page, or a file that exists; else ""."""
+    if word.startswith("http"):
+        return word.rstrip(".,;)")
+    try:
+        path = Path(word)
+        return path.absolute().as_uri() if path.is_file() else ""
+    except (OSError, ValueError):
+        return ""
