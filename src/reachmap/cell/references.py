@@ -218,6 +218,7 @@ def _check_joint_values(
             document.add(location, f"joints are missing: {', '.join(missing)}")
 
 
+# No part of a cell is larger or smaller; files in millimetres or inches are.
 DOUBTFUL_M = 10.0
 TINY_M = 1e-3
 # Below it, areas and volumes are lost in the rounding of coordinates.

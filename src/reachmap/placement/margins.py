@@ -12,7 +12,9 @@ from reachmap.placement.mapped.exact import Pose
 from reachmap.placement.mapped.sample import THIN
 from reachmap.placement.predicted.region import AXES
 
+# Points of the score that a designer would notice.
 DROP_POINTS = 5.0
+# From what a fixture holds to what a forklift driver does; finer where it matters.
 SHIFTS_M = (0.01, 0.02, 0.03, 0.05, 0.07, 0.10, 0.15)
 TURNS_RAD = tuple(np.radians((2.0, 5.0, 8.0, 12.0, 20.0, 30.0, 45.0)).tolist())
 # The pose itself; in each direction the last rung, then a bisection of the others.

@@ -10,6 +10,7 @@ import numpy as np
 from reachmap._typing import FloatArray
 from reachmap.maps.records import WorkspaceMap
 
+# Means of equal percentages differ in the last bits.
 TIE_PERCENT = 1e-6
 
 

@@ -12,7 +12,9 @@ from reachmap.placement.mapped.evaluator import Evaluator
 from reachmap.placement.mapped.exact import PlacedScene, PoseScore
 from reachmap.placement.mapped.imaging import imaging_configurations
 
+# Each is scored by mapping the bin, so few.
 FINALISTS = 6
+# Scores of the sample this close are equal; the shorter paths decide.
 EQUAL_POINTS = 0.5
 
 

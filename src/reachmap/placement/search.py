@@ -19,6 +19,7 @@ from reachmap.placement.problem import Question
 from reachmap.placement.steadying import steadied
 
 TURNS_DEG = (45.0, 90.0, 135.0)
+# The best may stand at the edge of what it can be; the second is for its runner-up.
 PLACES_IMPROVED = 2
 MOST_TURNS = PLACES_IMPROVED * len(TURNS_DEG)
 # Poses found not to be imaged, until no more are tried; what is near is not tried.
@@ -137,6 +138,8 @@ def _with_turn(pose: Pose, turn_deg: float, question: Question) -> Pose:
     return (*pose[:3], round(float(yaw), 9))
 
 
+# About a square of the usual map and a step of yaw; one halving ends at 20 mm, which
+# is finer than most bins are put down.
 FIRST_STEPS = (0.04, 0.04, 0.04, np.radians(15.0))
 ROUNDS = 4
 HALVINGS = 1

@@ -32,6 +32,7 @@ from reachmap.runtime.options import RunOptions
 from reachmap.runtime.progress import Progress
 from reachmap.runtime.run import run
 
+# Small enough that workers end together.
 PATHS_PER_UNIT = 50
 GraspPlace = tuple[int, int, int, int]
 

@@ -16,6 +16,8 @@ from reachmap.runtime.job import Ticket, compute, get_ready, unchanged
 from reachmap.runtime.options import RunOptions, worker_count
 from reachmap.runtime.pool import Slot
 
+# Enough on the way that no thread waits for the network, few enough that a lost worker
+# loses little.
 UNITS_PER_THREAD = 4
 WINDOW_AGE_S = 5.0
 WAIT_FOR_WORKERS_S = 300.0

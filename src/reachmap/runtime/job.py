@@ -33,6 +33,7 @@ KINDS: dict[str, str] = {
 }
 """Kind of scan to ``module:name`` of its :class:`Kind`; imported on use."""
 ENGINES = ("numpy", "scipy", "pin", "coal", "ompl", "eaik")
+# Stages of one run that a worker may be sent back to.
 KEPT_JOBS = 3
 MAX_TRACEBACK = 4000
 

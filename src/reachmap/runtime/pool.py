@@ -30,6 +30,7 @@ from reachmap.errors import EngineError, IncompleteError, ReachmapError
 from reachmap.runtime.encoding import encode
 from reachmap.runtime.job import Job, Reply, Ticket, compute, get_ready, ticket_for
 
+# One death may be chance (memory, an impatient scheduler), three are the unit's.
 STRIKES = 3
 MORE_STRIKES = 9
 FAILED_STARTS = 3

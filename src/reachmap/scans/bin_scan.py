@@ -41,6 +41,7 @@ from reachmap.scans.routes import RouteAttempts, WayIn
 if TYPE_CHECKING:
     from reachmap.cell.loading import LoadedCell
 
+# About a second of planning: little is lost with a unit, little spent on keeping it.
 GRASPS_PER_UNIT = 45
 
 

@@ -267,6 +267,7 @@ class _Surveyor:
         return way
 
 
+# Large enough to be solved in batches, small enough that workers end together.
 FRAMES_PER_UNIT = 270
 
 

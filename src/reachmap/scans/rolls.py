@@ -17,6 +17,7 @@ from reachmap.maps.summary.directions import same_direction
 from reachmap.sampling.frames import FrameGrid
 from reachmap.scans.ik_survey import MAX_COUNT, Survey
 
+# Rounding of rolls that are meant to be equal.
 _SAME_ROLL_RAD = 1e-6
 # Rolls that are solved at once for directions that have no goal yet.
 _AT_ONCE = 4

@@ -26,6 +26,7 @@ from reachmap.scans.workspace_results import FrameResults, assemble_workspace_ma
 if TYPE_CHECKING:
     from reachmap.cell.loading import LoadedCell
 
+# Few, as planning to one frame may take its whole budget.
 FRAMES_PER_UNIT = 9
 
 

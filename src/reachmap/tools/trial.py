@@ -12,6 +12,7 @@ from reachmap.core.robot.model import RobotModel
 from reachmap.core.scene import Scene
 from reachmap.geometry import AXES
 
+# 2000 random configurations find a free share of 0.2 % in 98 of 100 cases.
 SAMPLES = 2000
 MANY = 40
 ALWAYS = 0.98

@@ -42,6 +42,7 @@ from reachmap.validation.random_grasps import random_grasps
 from reachmap.validation.routes import plan_picks_over_routes
 from reachmap.validation.summary import Validation, summarise
 
+# 15 degrees between rolls.
 DEFAULT_ROLLS = 24
 MAX_ROLLS, MAX_REPEATS = 360, 255
 

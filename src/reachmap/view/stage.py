@@ -19,6 +19,7 @@ from reachmap.view.points import MapPoints
 if TYPE_CHECKING:
     import viser
 
+# Edges sharper than 34 degrees stay edges; drums of arms are shaded round.
 CREASE_RAD = 0.6
 # Walls and floors that would hide the arm are seen through.
 LARGE_BODY_M = 1.5

@@ -27,6 +27,8 @@ if TYPE_CHECKING:
     from reachmap.cell.loading import LoadedCell
     from reachmap.core.robot.model import RobotModel
 
+# Less than any placement is accurate to, more than the rounding of a pose that stands
+# on a surface.
 CONTACT_M = 2e-4
 WHOLE = "bin"
 

@@ -29,6 +29,8 @@ from reachmap.core.robot.chain import SerialChain
 if TYPE_CHECKING:
     from reachmap.core.robot.model import RobotModel
 
+# Doubled from half the usual resolution on: what is clear by more than the last rung
+# is rare in a bin, and each rung costs a set of pairs to keep.
 LADDER_M = (0.004, 0.008, 0.016, 0.032, 0.064)
 WIDEST_M = LADDER_M[-1]
 _NO_PAIR = -1

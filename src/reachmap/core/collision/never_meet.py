@@ -21,7 +21,9 @@ if TYPE_CHECKING:
     from reachmap.core.collision.bodies import BodyGeometry
     from reachmap.core.robot.model import RobotModel
 
+# Boxes over three joints are too many to finish: neighbours and their neighbours it is.
 MAX_JOINTS = 2
+# A bound on the work for one pair; what takes more stays checked.
 MAX_BOXES = 3000
 
 

@@ -10,6 +10,7 @@ from reachmap.core.robot.assembly import TCP_FRAME
 from reachmap.core.robot.chain import SerialChain, pose_error
 from reachmap.core.robot.model import RobotModel
 
+# From a neighbouring pose Newton's method needs a few; more mean a singularity.
 _ITERATIONS = 12
 
 

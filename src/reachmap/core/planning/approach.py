@@ -11,6 +11,7 @@ from reachmap.core.kinematics.kinematics import Kinematics
 from reachmap.core.planning.motion import MotionChecker
 from reachmap.geometry import rotation_angle
 
+# Long enough to be few, short enough for Newton's method to stay on its branch.
 STEP_M = 0.01
 # A joint that moves further from step to step may have turned over to another branch;
 # the step is halved until it does not, or until so little is left that it has.

@@ -12,6 +12,7 @@ from reachmap._typing import BoolArray, FloatArray, IntArray
 from reachmap.cell.model.roadmap import RoadmapSpec
 from reachmap.core.kinematics.windings import TURN_RAD, Windings
 
+# Below it, starting the threads costs more than the queries.
 _WORTH_THREADS = 1000
 
 

@@ -16,6 +16,7 @@ import numpy as np
 from reachmap._typing import FloatArray
 
 MotionTest = Callable[[FloatArray, FloatArray], bool]
+# A path that is shorter by less than repeats a motion check for nothing.
 _LEAST_GAIN_RAD = 1e-3
 
 

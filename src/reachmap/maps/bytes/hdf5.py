@@ -17,6 +17,7 @@ import numpy as np
 from reachmap.maps.bytes.to_json import plain
 from reachmap.maps.bytes.tree import Array, Leaf, Tree
 
+# What a reader has to hold at once.
 CHUNK_BYTES = 16 * 2**20
 MAX_OBJECTS = 10_000
 MAX_BYTES = 16 * 2**30

@@ -71,6 +71,7 @@ def is_open_for_writing(image: bytes) -> bool:
     return bool(image[11 if image[8] >= 2 else 20] & 1)
 
 
+# Generous for starting Python on a busy machine, and for reading at 2 MB/s.
 TIME_LIMIT_S = 15.0
 SECONDS_PER_BYTE = 0.5e-6
 

@@ -20,6 +20,7 @@ from reachmap.maps.records import BinMap, Status, WorkspaceMap
 
 Frame: TypeAlias = Literal["robot_base", "bin", "world"]
 
+# Above the rounding of files, far below any spacing of frames.
 TOLERANCE_M = 1e-4
 TOLERANCE_DEG = 0.1
 

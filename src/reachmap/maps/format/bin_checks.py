@@ -23,6 +23,7 @@ from reachmap.maps.format.checks import (
 from reachmap.maps.records import NO_PAIR, Status
 from reachmap.maps.summary.directions import direction_percent
 
+# Sums of the same times in another order.
 _TIME_TOLERANCE_S = 1e-9
 _PATH_VALUES = (
     "path_length", "path_length_planned", "tcp_path_length", "execution_time",

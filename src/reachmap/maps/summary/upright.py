@@ -15,6 +15,7 @@ _LATTICE = ("x", "y", "z")
 _STITCHED = (
     *_LATTICE, "cubes", "path_reachability", "ik_reachability", "ik_free_reachability",
 )  # fmt: skip
+# Rounding of a quarter turn.
 WHOLE = 1e-9
 
 

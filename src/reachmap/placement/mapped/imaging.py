@@ -19,7 +19,9 @@ from reachmap.placement.mapped.viewpoints import (
     view_of,
 )
 
+# Configurations nearer than this are the same to a planner.
 APART_RAD = 0.4
+# Corners of the volume lie in its walls, where no line of sight ends.
 INSET_M = 0.001
 UNSEEN = "no scan configuration images the bin"
 OUT_OF_SIGHT = "the camera does not see the bin"

@@ -11,6 +11,8 @@ from reachmap._typing import BoolArray, FloatArray, IntArray
 from reachmap.cell.model.cell import CameraSpec
 from reachmap.geometry import inverse_transform, transform_from_parts
 
+# Poses of the camera around each of nine targets: steps small enough that one sees
+# the whole bin where any does, few enough to be solved at once.
 DISTANCES = 6
 TILTS_DEG = (0.0, 8.0, 16.0)
 AZIMUTHS = 8

@@ -12,6 +12,8 @@ from reachmap.placement.mapped.exact import Pose, PoseScore
 from reachmap.placement.predicted.prediction import PoseGrid, Prediction
 from reachmap.placement.predicted.region import Region
 
+# Scores are interpolated between the lattice's points: a finer grid finds no better
+# place, a coarser one misses narrow ones.
 STEPS_PER_SQUARE = 4
 YAW_STEP_DEG = 15.0
 YAWS_PER_LEVEL = 2

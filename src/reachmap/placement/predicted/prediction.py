@@ -19,6 +19,7 @@ from reachmap.geometry import rotation_from_quaternion_wxyz
 from reachmap.maps.records import Status, WorkspaceMap, stitch_cubes
 from reachmap.placement.mapped.sample import frames_in_bin, spread_indices
 
+# Along the longer and the shorter side, 20 as in a coarse bin scan.
 POINTS = (5, 4)
 
 
@@ -163,6 +164,7 @@ def _sampled(
     return np.asarray(by_y @ (along_z @ by_x.T))
 
 
+# Rounding of a lattice's last coordinate.
 _EDGE = 1e-9
 
 

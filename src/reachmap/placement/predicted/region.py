@@ -12,6 +12,7 @@ from reachmap.cell.model.cell import PlacementSpec
 from reachmap.errors import SettingsError
 
 AXES = ("x", "y", "z", "yaw")
+# Rounding of limits [m, rad].
 SLACK = 1e-9
 
 

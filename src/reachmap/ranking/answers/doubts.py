@@ -22,6 +22,7 @@ RESOLVED: Final = 0.7
 """Share of those that a mistake, undone, must bring back to be asked about."""
 
 
+# No arm in the field reaches beyond 5 m, and no bin is 2 mm wide.
 MILLIMETRES_FROM_M: Final = 5.0
 METRES_BELOW_M: Final = 2e-3
 

@@ -83,6 +83,7 @@ def _two_least(values: FloatArray) -> IntArray:
     return np.stack([first, rest.argmin(axis=1)], axis=1)
 
 
+# Distances this close are equal: positions in lists are rounded to the micrometre.
 TIE_M: Final = 1e-6
 TIE_RAD: Final = 1e-6
 # A point of a lattice has at most seven others at the same distance from a grasp.

@@ -24,6 +24,7 @@ from reachmap.ranking.terms.margins import margin_terms, margin_values
 from reachmap.ranking.terms.seconds import CycleSeconds, cycle_seconds
 
 TERMS: Final = ("path_length", "planning_time", "execution_time")
+# Rounding of directions that are meant to be equal.
 SAME_AXIS_RAD: Final = 1e-6
 
 

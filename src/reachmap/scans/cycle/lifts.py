@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from reachmap.cell.loading import LoadedCell
     from reachmap.scans.bin_roadmap import BinRoadmap
 
+# Large enough to be solved in batches, small enough that workers end together.
 LIFTS_PER_UNIT = 200
 NEAREST_TO_SUCCESS = (
     StageStatus.LIFT_BLOCKED,

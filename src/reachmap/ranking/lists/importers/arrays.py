@@ -15,6 +15,7 @@ from reachmap._typing import FloatArray
 from reachmap.errors import GraspListError
 from reachmap.ranking.lists.document import MAX_GRASPS
 
+# Networks answer in half precision, three digits.
 UNIT_TOLERANCE: Final = 1e-2
 MAX_NPZ_BYTES: Final = 32 * 2**20
 GRASPNET_COLUMNS: Final = 17
