@@ -303,7 +303,7 @@ def test_wrong_cells_are_refused(
 
 
 def test_meshes_are_hashed_and_their_sizes_questioned(tmp_path: Path) -> None:
-    """Ten metres raise a doubt, a hundred are refused, in cell and URDF alike."""
+    """Ten metres raise a warning, a hundred are refused, in cell and URDF alike."""
     text = CELL.replace("{box: [0.1, 0.1, 1.0]}", "{mesh: {file: post.stl}}")
     path = write(tmp_path, text, '<mesh filename="arm.stl"/>')
     (tmp_path / "arm.stl").write_bytes(triangle_stl(1.0))
@@ -325,7 +325,7 @@ def test_meshes_are_hashed_and_their_sizes_questioned(tmp_path: Path) -> None:
         read_cell(path)
 
 
-def test_large_bodies_raise_a_doubt(tmp_path: Path) -> None:
+def test_large_bodies_raise_a_warning(tmp_path: Path) -> None:
     """A floor of 30 m is allowed, but questioned with its place."""
     path = write(tmp_path)
     loaded = read_cell(path, ["bodies.post.shape.box=[30, 1, 1]", "bin.inner.0=11"])

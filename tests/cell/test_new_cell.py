@@ -501,7 +501,7 @@ def test_what_cannot_work_yet_is_written_to_be_mended(tmp_path: Path) -> None:
     assert output.exists()
 
 
-def test_what_the_loader_doubts_is_said_at_once(tmp_path: Path) -> None:
+def test_what_the_loader_warns_of_is_said_at_once(tmp_path: Path) -> None:
     """An arm without collision elements would be green everywhere."""
     path = urdf(tmp_path / "arm.urdf", arm().replace("collision", "visual"))
     made = new_cell(path, output=tmp_path / "cell.yaml")

@@ -19,7 +19,7 @@ from reachmap.placement.decision import (
 from reachmap.placement.mapped.sample import open_frames
 from reachmap.placement.predicted.places import apart_m
 from reachmap.placement.predicted.region import Region
-from reachmap.placement.problem import Question
+from reachmap.placement.problem import PlacementProblem
 from reachmap.placement.search import decide_by_search
 from tests.support.closed_form_evaluator import ClosedForm
 from tests.support.optional import present
@@ -33,20 +33,20 @@ X = np.round(np.arange(0.0, 1.01, 0.1), 9)
 Y = np.round(np.arange(-0.8, 0.81, 0.16), 9)
 
 
-def question(
+def problem(
     formula,
     *,
     low=(0.0, -0.8, 0.0, 0.0),
     high=(1.0, 0.8, 0.1, np.pi),
     keep_scan=True,
 ):
-    """A question on the UR5 cell whose poses are scored by a formula."""
+    """A problem on the UR5 cell whose poses are scored by a formula."""
     x, y = np.meshgrid(X, Y)
     near = np.clip(1.2 - np.hypot(x - 0.5, y - 0.3), 0.0, 1.0)
     workspace = synthetic_workspace_map(
         np.array([near, near]), x=X, y=Y, z=np.array([0.0, 0.1]), orientations=9
     )
-    return Question(
+    return PlacementProblem(
         loaded=SCENE.loaded,
         workspace=workspace,
         is_open=open_frames(SCENE.robot, SCENE.loaded),
@@ -72,7 +72,7 @@ def hill(x, y, z, yaw):
 
 def test_the_search_climbs_to_the_summit():
     """From the best places of the map the exact search goes to what is really best."""
-    asked = question(hill(0.46, 0.2, 0.05, 0.6))
+    asked = problem(hill(0.46, 0.2, 0.05, 0.6))
     decision = decide_by_search(asked, 5)
     rows = decision.table.rows
     best = rows[decision.ranked[0]]
@@ -86,7 +86,7 @@ def test_the_search_climbs_to_the_summit():
 
 def test_the_runner_up_stands_elsewhere():
     """The runner-up is the best of those half a bin away, not the next step."""
-    asked = question(hill(0.46, 0.2, 0.05, 0.6))
+    asked = problem(hill(0.46, 0.2, 0.05, 0.6))
     decision = decide_by_search(asked, 5)
     outcome = settle(asked, decision)
     rows = decision.table.rows
@@ -99,7 +99,7 @@ def test_the_runner_up_stands_elsewhere():
 
 def test_announced_poses_are_never_too_few():
     """Progress never has to be corrected upwards, and ends at what was looked at."""
-    asked = question(hill(0.46, 0.2, 0.05, 0.6))
+    asked = problem(hill(0.46, 0.2, 0.05, 0.6))
     settle(asked, decide_by_search(asked, 3))
     evaluator = asked.evaluator
     totals = [before + more for before, more in evaluator.expected]
@@ -109,7 +109,7 @@ def test_announced_poses_are_never_too_few():
 
 def test_fixed_values_stay_fixed():
     """Neither steps nor turns leave a fixed value or the region."""
-    asked = question(
+    asked = problem(
         hill(0.9, 0.7, 0.3, 2.0), low=(0.3, -0.2, 0.05, 0.5), high=(0.6, 0.3, 0.05, 0.5)
     )
     decide_by_search(asked, 4)
@@ -124,12 +124,12 @@ def test_a_region_in_the_pedestal_is_a_clear_error():
     """Where the bin can stand nowhere, the message says what it meets."""
     low, high = (0.0, -0.1, -0.3, 0.0), (0.2, 0.1, -0.1, np.pi)
     with pytest.raises(SceneError, match=r"nowhere.*the bin collides with pedestal"):
-        decide_by_search(question(hill(0, 0, 0, 0), low=low, high=high), 5)
+        decide_by_search(problem(hill(0, 0, 0, 0), low=low, high=high), 5)
 
 
 def test_a_region_without_a_scan_configuration_is_a_clear_error():
     """Where the arm would meet the bin at every pose, the message says so."""
-    asked = question(lambda pose: "bin wall +x | forearm at the scan configuration")
+    asked = problem(lambda pose: "bin wall +x | forearm at the scan configuration")
     with pytest.raises(SceneError, match=r"nowhere.*forearm at the scan config"):
         decide_by_search(asked, 5)
     with pytest.raises(SceneError, match=r"nowhere.*forearm at the scan config"):
@@ -138,7 +138,7 @@ def test_a_region_without_a_scan_configuration_is_a_clear_error():
 
 def test_the_papers_pose_is_its_point_at_the_cells_own_angle():
     """The centre of the inner bottom is put on the densest point, turned as before."""
-    asked = question(hill(0.46, 0.2, 0.05, 0.6))
+    asked = problem(hill(0.46, 0.2, 0.05, 0.6))
     pose = present(paper_pose(asked))
     level = asked.workspace.path_reachability[0]
     assert pose[3] == pytest.approx(np.pi / 2)
@@ -153,7 +153,7 @@ def test_the_papers_pose_is_its_point_at_the_cells_own_angle():
 
 def test_a_given_pose_is_scored_beside_the_papers():
     """The user's pose is row 0 and chosen, the paper's is there to compare."""
-    asked = question(hill(0.46, 0.2, 0.05, 0.6))
+    asked = problem(hill(0.46, 0.2, 0.05, 0.6))
     decision = decide_as_given(asked, (0.5, 0.0, 0.0, 0.0))
     assert decision.ranked == [0]
     assert decision.table.rows[0].pose == (0.5, 0.0, 0.0, 0.0)
@@ -163,19 +163,19 @@ def test_a_given_pose_is_scored_beside_the_papers():
 def test_a_given_pose_in_the_pedestal_names_the_pair():
     """A pose that cannot be is refused, with the part of the bin and the body."""
     with pytest.raises(SceneError, match=r"--bin-pose: bin .* touches pedestal"):
-        decide_as_given(question(hill(0, 0, 0, 0)), (0.2, 0.2, -0.1, 0.0))
+        decide_as_given(problem(hill(0, 0, 0, 0)), (0.2, 0.2, -0.1, 0.0))
 
 
 def test_a_given_pose_without_a_start_says_why():
     """A pose with the arm in the way is refused with the reason."""
-    asked = question(lambda pose: "bin wall +x | forearm at the scan configuration")
+    asked = problem(lambda pose: "bin wall +x | forearm at the scan configuration")
     with pytest.raises(SceneError, match=r"--bin-pose: bin wall \+x \| forearm"):
         decide_as_given(asked, (0.5, 0.0, 0.0, 0.0))
 
 
 def test_places_that_cannot_be_imaged_are_passed_over():
     """High places, where the camera cannot get above the bin, are excluded as such."""
-    asked = question(
+    asked = problem(
         lambda pose: 60.0 + 30.0 * pose[2],
         low=(0.2, -0.6, 0.0, 0.0),
         high=(0.8, 0.6, 0.7, 0.0),
@@ -196,7 +196,7 @@ def test_places_that_cannot_be_imaged_are_passed_over():
 
 def test_a_bin_too_high_for_the_camera_is_a_clear_error():
     """Where no place can be imaged, the message says so and what to look at."""
-    asked = question(
+    asked = problem(
         lambda pose: 90.0,
         low=(0.4, 0.0, 0.9, 0.0),
         high=(0.6, 0.1, 0.9, 0.0),

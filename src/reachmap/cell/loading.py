@@ -21,7 +21,7 @@ from reachmap.cell.mounting import (
     write_out_mount,
 )
 from reachmap.cell.pick_cycle import check_part_choice
-from reachmap.cell.references import check_names, find_doubts
+from reachmap.cell.references import check_names, find_warnings
 from reachmap.cell.resolution import resolved_cell, validated
 from reachmap.cell.text.expressions import resolve_expressions, restore_expressions
 from reachmap.cell.text.messages import did_you_mean
@@ -119,7 +119,7 @@ def cell_from_text(
     files = read_files(document, directory)
     if files.robot is not None:
         check_names(document, files.robot, files.srdf_description)
-    warnings = find_doubts(document, cell, files) if cell is not None else ()
+    warnings = find_warnings(document, cell, files) if cell is not None else ()
     warnings += tuple(line for e in files.expansions for line in e.warnings)
     warnings = (*files.notes, *warnings)
     document.raise_mistakes()

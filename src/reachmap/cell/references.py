@@ -219,46 +219,48 @@ def _check_joint_values(
 
 
 # No part of a cell is larger or smaller; files in millimetres or inches are.
-DOUBTFUL_M = 10.0
+LARGE_M = 10.0
 TINY_M = 1e-3
 # Below it, areas and volumes are lost in the rounding of coordinates.
 NO_SIZE_M = 1e-9
 
 
-def find_doubts(document: Document, cell: Cell, files: CellFiles) -> tuple[str, ...]:
+def find_warnings(document: Document, cell: Cell, files: CellFiles) -> tuple[str, ...]:
     """Sentences about links that cannot collide, and sizes above 10 m or below 1 mm.
 
     A mesh larger than 100 m, or of no size, is a mistake of the document rather than a
-    doubt.
+    warning.
     """
-    doubts: list[str] = []
+    warnings: list[str] = []
     for index, body in enumerate(cell.bodies):
         location: Location = ("bodies", index, "shape")
         mesh = body.shape.mesh
         if mesh is not None:
             key, label = body_key(body.name, mesh.file), f"mesh of body {body.name!r}"
             scale = mesh.factors
-            doubts += _mesh_doubts(document, files, key, label, scale, location)
-        elif (side := float(sides(body.shape).max())) > DOUBTFUL_M:
-            doubts.append(_large(document, location, f"body {body.name!r}", side))
-    doubts += _part_doubts(document, cell, files)
+            warnings += _mesh_warnings(document, files, key, label, scale, location)
+        elif (side := float(sides(body.shape).max())) > LARGE_M:
+            warnings.append(_large(document, location, f"body {body.name!r}", side))
+    warnings += _part_warnings(document, cell, files)
     where: Location = ("bin", "inner")
-    if max(cell.bin.inner) > DOUBTFUL_M:
-        doubts.append(_large(document, where, "the bin", max(cell.bin.inner)))
+    if max(cell.bin.inner) > LARGE_M:
+        warnings.append(_large(document, where, "the bin", max(cell.bin.inner)))
     if cell.bin.mesh is not None:
         key, scale = body_key("bin", cell.bin.mesh.file), cell.bin.mesh.factors
         where = ("bin", "mesh")
-        doubts += _mesh_doubts(document, files, key, "mesh of the bin", scale, where)
+        warnings += _mesh_warnings(
+            document, files, key, "mesh of the bin", scale, where
+        )
     if files.robot is not None:
-        doubts += _links_unchecked(document, cell, files.robot)
+        warnings += _links_unchecked(document, cell, files.robot)
         for name, scale in mesh_scales(files.robot.collisions).items():
             label = f"URDF mesh {name.rsplit('/', 1)[-1]!r}"
             where = ("robot", "urdf")
-            doubts += _mesh_doubts(document, files, name, label, scale, where)
-    return tuple(doubts)
+            warnings += _mesh_warnings(document, files, name, label, scale, where)
+    return tuple(warnings)
 
 
-def _part_doubts(document: Document, cell: Cell, files: CellFiles) -> list[str]:
+def _part_warnings(document: Document, cell: Cell, files: CellFiles) -> list[str]:
     held = cell.held()
     if held is None:
         given = [n for n in ("lift", "drop_off", "cycle") if at(document.data, n)]
@@ -271,9 +273,9 @@ def _part_doubts(document: Document, cell: Cell, files: CellFiles) -> list[str]:
     mesh, label = part.shape.mesh, "mesh of the part"
     if mesh is not None:
         file_key = body_key(key, mesh.file)
-        return _mesh_doubts(document, files, file_key, label, mesh.factors, location)
+        return _mesh_warnings(document, files, file_key, label, mesh.factors, location)
     side = float(sides(part.shape).max())
-    return [_large(document, location, "the part", side)] if side > DOUBTFUL_M else []
+    return [_large(document, location, "the part", side)] if side > LARGE_M else []
 
 
 def _links_unchecked(
@@ -298,7 +300,7 @@ def _links_unchecked(
     ]
 
 
-def _mesh_doubts(
+def _mesh_warnings(
     document: Document,
     files: CellFiles,
     key: str,
@@ -319,7 +321,7 @@ def _mesh_doubts(
             f"{label} is {side:,.4g} m large; is it in millimetres? (scale: 0.001)",
         )
         return []
-    if side > DOUBTFUL_M:
+    if side > LARGE_M:
         return [_large(document, location, label, side)]
     if side < TINY_M:
         place = document.place(location)

@@ -21,7 +21,7 @@ from reachmap.placement.mapped.sample import THIN, sample_of
 from reachmap.placement.margins import MARGIN_POSES, margins
 from reachmap.placement.paper_rule import LatticePoint, choose_by_paper
 from reachmap.placement.predicted.places import apart_m, rank_key
-from reachmap.placement.problem import Question
+from reachmap.placement.problem import PlacementProblem
 from reachmap.placement.scan_choice import FINALISTS, ScanChoice, choose_scan
 from reachmap.placement.steadying import worst_of
 from reachmap.sampling.frames import approach_distance_m
@@ -76,7 +76,7 @@ class Decision:
         )
 
 
-def decide_by_paper(question: Question) -> Decision:
+def decide_by_paper(problem: PlacementProblem) -> Decision:
     """Take the paper's choice, with the map's prediction for comparison.
 
     Raises
@@ -85,20 +85,20 @@ def decide_by_paper(question: Question) -> Decision:
         The bin can stand nowhere on the map.
     """
     decision = Decision()
-    for place in question.predicted():
+    for place in problem.predicted():
         decision.table.add(place)
-    pose = paper_pose(question)
+    pose = paper_pose(problem)
     if pose is None:
-        raise SceneError(nowhere(question, decision.table))
-    question.evaluator.expect(1 + SETTLING)
-    decision.paper = decision.table.add(question.exact([pose])[0])
+        raise SceneError(nowhere(problem, decision.table))
+    problem.evaluator.expect(1 + SETTLING)
+    decision.paper = decision.table.add(problem.exact([pose])[0])
     decision.rank()
     if not decision.ranked:
-        raise SceneError(nowhere(question, decision.table))
+        raise SceneError(nowhere(problem, decision.table))
     return decision
 
 
-def decide_as_given(question: Question, pose: Pose) -> Decision:
+def decide_as_given(problem: PlacementProblem, pose: Pose) -> Decision:
     """Score a pose that the user has in mind, and the paper's beside it.
 
     Raises
@@ -106,14 +106,14 @@ def decide_as_given(question: Question, pose: Pose) -> Decision:
     SceneError
         The bin would collide with something; both are named.
     """
-    contact = question.fit.contact(question.T_base_bin(pose))
+    contact = problem.fit.contact(problem.T_base_bin(pose))
     if contact is not None:
         raise SceneError(f"--bin-pose: {contact.pair}")
     decision = Decision()
-    paper = paper_pose(question)
+    paper = paper_pose(problem)
     poses = [pose] if paper is None or paper == pose else [pose, paper]
-    question.evaluator.expect(len(poses) + SETTLING)
-    for candidate in question.exact(poses):
+    problem.evaluator.expect(len(poses) + SETTLING)
+    for candidate in problem.exact(poses):
         row = decision.table.add(candidate)
         if candidate.pose == paper:
             decision.paper = row
@@ -124,13 +124,13 @@ def decide_as_given(question: Question, pose: Pose) -> Decision:
     return decision
 
 
-def paper_pose(question: Question) -> Pose | None:
+def paper_pose(problem: PlacementProblem) -> Pose | None:
     """Pose that the paper's rule takes: the first of its points that is feasible.
 
     The centre of the inner bottom is put on the point, at the cell's own angle or, if
     the bin cannot stand there like that, turned by 90 degrees.
     """
-    workspace, cell = question.workspace, question.loaded.cell
+    workspace, cell = problem.workspace, problem.loaded.cell
     T_level_bin = inverse_transform(cell.T_base_level()) @ cell.T_base_bin()
     yaw = float(np.arctan2(T_level_bin[1, 0], T_level_bin[0, 0]))
     found: list[Pose] = []
@@ -145,7 +145,7 @@ def paper_pose(question: Question) -> Pose | None:
             )
         )
         for angle in (yaw, yaw + np.pi / 2):
-            if not question.reason_against((x, y, z, angle), floats=True):
+            if not problem.reason_against((x, y, z, angle), floats=True):
                 found.append((x, y, z, angle))
                 return True
         return False
@@ -154,21 +154,21 @@ def paper_pose(question: Question) -> Pose | None:
     return found[0] if found else None
 
 
-def nowhere(question: Question, table: CandidateTable) -> str:
+def nowhere(problem: PlacementProblem, table: CandidateTable) -> str:
     """Say that the bin can stand nowhere, with the reasons in a table."""
     reasons = sorted({reason for reason in table.reasons() if reason})
     why = f" ({'; '.join(reasons[:4])})" if reasons else ""
-    return f"{question.loaded.source}: the bin can stand nowhere in the region{why}"
+    return f"{problem.loaded.source}: the bin can stand nowhere in the region{why}"
 
 
-def why_no_place(question: Question, decision: Decision) -> str:
+def why_no_place(problem: PlacementProblem, decision: Decision) -> str:
     """Say why no pose serves a single test frame; "" where one does."""
     best = decision.table.rows[decision.ranked[0]]
     if best.score is None or best.score.score > 0.0:
         return ""
-    sample = sample_of(question.loaded.cell, THIN, question.is_open)
-    placed = PlacedScene(question.moving, best.pose, sample)
-    approach_m = approach_distance_m(question.loaded.cell)
+    sample = sample_of(problem.loaded.cell, THIN, problem.is_open)
+    placed = PlacedScene(problem.moving, best.pose, sample)
+    approach_m = approach_distance_m(problem.loaded.cell)
     survey = survey_frames(placed.scene, placed.T, approach_m)
     status = survey.status.copy()
     status[status == Status.NOT_ATTEMPTED] = Status.NO_PATH_FOUND
@@ -176,7 +176,7 @@ def why_no_place(question: Question, decision: Decision) -> str:
     why = likeliest_cause(status, survey.blocking_pair, pairs)
     x, y, z, yaw = best.pose
     return (
-        f"{question.loaded.source}: no place for the bin: even at x={x:.3f} y={y:.3f} "
+        f"{problem.loaded.source}: no place for the bin: even at x={x:.3f} y={y:.3f} "
         f"z={z:.3f} yaw={np.degrees(yaw):.0f} {why}"
     )
 
@@ -201,12 +201,12 @@ class Outcome:
     margin: dict[str, float]
 
 
-def settle(question: Question, decision: Decision) -> Outcome:
+def settle(problem: PlacementProblem, decision: Decision) -> Outcome:
     """Choose the best pose that can be imaged, and its scan configuration.
 
     Parameters
     ----------
-    question : Question
+    problem : PlacementProblem
     decision : Decision
         Its table gets a row for the chosen pose as seen from a new configuration,
         and reasons where there is none.
@@ -218,26 +218,26 @@ def settle(question: Question, decision: Decision) -> Outcome:
     """
     rows = decision.table.rows
     for row in decision.ranked:
-        question.evaluator.expect(SETTLING)
-        scan = _scan(question, rows[row])
+        problem.evaluator.expect(SETTLING)
+        scan = _scan(problem, rows[row])
         if scan is None:
             rows[row] = Candidate(pose=rows[row].pose, exact=True, reason=UNSEEN)
             continue
         pose = rows[row].pose
-        if rows[row].worst is None and not question.tolerance.is_none:
-            worst = worst_of(question, rows[row]).score
+        if rows[row].worst is None and not problem.tolerance.is_none:
+            worst = worst_of(problem, rows[row]).score
             rows[row] = dataclasses.replace(rows[row], worst=worst)
         chosen = row
         if scan.is_new:
             chosen = decision.table.add(_from_scan(rows[row], scan))
         return Outcome(
             chosen=chosen,
-            runner_up=decision.runner_up(pose, question.different_place_m),
+            runner_up=decision.runner_up(pose, problem.different_place_m),
             paper_choice=_paper_row(decision, row, chosen),
             scan=scan,
-            margin=_margins(question, pose, scan.q),
+            margin=_margins(problem, pose, scan.q),
         )
-    raise SceneError(f"{question.loaded.source}: {UNSEEN}; {REMEDY}")
+    raise SceneError(f"{problem.loaded.source}: {UNSEEN}; {REMEDY}")
 
 
 def _from_scan(candidate: Candidate, scan: ScanChoice) -> Candidate:
@@ -248,26 +248,26 @@ def _from_scan(candidate: Candidate, scan: ScanChoice) -> Candidate:
     return dataclasses.replace(candidate, score=scan.score, worst=worst)
 
 
-def _scan(question: Question, candidate: Candidate) -> ScanChoice | None:
-    if not question.keep_scan:
-        sample = sample_of(question.loaded.cell, THIN, question.is_open)
-        placed = PlacedScene(question.moving, candidate.pose, sample)
-        return choose_scan(placed, question.evaluator)
-    if not question.can_be_imaged(candidate.pose):
+def _scan(problem: PlacementProblem, candidate: Candidate) -> ScanChoice | None:
+    if not problem.keep_scan:
+        sample = sample_of(problem.loaded.cell, THIN, problem.is_open)
+        placed = PlacedScene(problem.moving, candidate.pose, sample)
+        return choose_scan(placed, problem.evaluator)
+    if not problem.can_be_imaged(candidate.pose):
         return None
     assert candidate.score is not None
-    q: FloatArray = np.array(question.scene.scan_configuration)
+    q: FloatArray = np.array(problem.scene.scan_configuration)
     return ScanChoice(q=q, score=candidate.score, is_new=False)
 
 
-def _margins(question: Question, pose: Pose, q: FloatArray) -> dict[str, float]:
+def _margins(problem: PlacementProblem, pose: Pose, q: FloatArray) -> dict[str, float]:
     """Margins with the arm at a scan configuration, the region left aside."""
-    fit = BinFit(question.scene.robot, question.loaded, q)
+    fit = BinFit(problem.scene.robot, problem.loaded, q)
     return margins(
         pose,
         q,
-        lambda moved: fit.contact(question.T_base_bin(moved)) is None,
-        question.evaluator,
+        lambda moved: fit.contact(problem.T_base_bin(moved)) is None,
+        problem.evaluator,
     )
 
 

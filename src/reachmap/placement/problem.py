@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Question:
+class PlacementProblem:
     """What is asked: a cell, its workspace map, and where the bin may stand.
 
     Attributes

@@ -15,7 +15,7 @@ from reachmap.placement.mapped.exact import Pose
 from reachmap.placement.mapped.imaging import UNSEEN
 from reachmap.placement.predicted.places import apart_m, rank_key, spread_out
 from reachmap.placement.predicted.region import AXES, Region
-from reachmap.placement.problem import Question
+from reachmap.placement.problem import PlacementProblem
 from reachmap.placement.steadying import steadied
 
 TURNS_DEG = (45.0, 90.0, 135.0)
@@ -27,12 +27,12 @@ MOST_UNSEEN = 40
 NEAR_UNSEEN_M = 0.05
 
 
-def decide_by_search(question: Question, top: int) -> Decision:
+def decide_by_search(problem: PlacementProblem, top: int) -> Decision:
     """Search x, y, z and yaw.
 
     Parameters
     ----------
-    question : Question
+    problem : PlacementProblem
     top : int
         Different places that are mapped with the bin in the scene.
 
@@ -42,30 +42,32 @@ def decide_by_search(question: Question, top: int) -> Decision:
         The bin can stand nowhere.
     """
     decision = Decision()
-    finalists = _finalists(question, top, decision.table)
-    paper = paper_pose(question)
+    finalists = _finalists(problem, top, decision.table)
+    paper = paper_pose(problem)
     poses = [c.pose for c in finalists] + ([] if paper is None else [paper])
-    question.evaluator.expect(len(poses) + MOST_TURNS + REFINE_POSES + SETTLING)
-    mapped = question.exact(poses)
+    problem.evaluator.expect(len(poses) + MOST_TURNS + REFINE_POSES + SETTLING)
+    mapped = problem.exact(poses)
     scored = sorted((c for c in mapped if c.score is not None), key=rank_key)
-    better = _improved(question, scored[:PLACES_IMPROVED])
-    mapped += question.exact([pose for pose in better if pose not in poses])
+    better = _improved(problem, scored[:PLACES_IMPROVED])
+    mapped += problem.exact([pose for pose in better if pose not in poses])
     # The paper's rule knows of no support; where its bin floats it is compared alone.
-    unfit = {paper} if paper is not None and question.reason_against(paper) else set()
-    steady = steadied(question, [c for c in mapped if c.pose not in unfit])
+    unfit = {paper} if paper is not None and problem.reason_against(paper) else set()
+    steady = steadied(problem, [c for c in mapped if c.pose not in unfit])
     for candidate in {c.pose: c for c in [*mapped, *steady]}.values():
         row = decision.table.add(candidate)
         if candidate.pose == paper:
             decision.paper = row
     decision.rank([c.pose for c in steady], unfit)
     if not decision.ranked:
-        raise SceneError(nowhere(question, decision.table))
+        raise SceneError(nowhere(problem, decision.table))
     return decision
 
 
-def _finalists(question: Question, top: int, table: CandidateTable) -> list[Candidate]:
+def _finalists(
+    problem: PlacementProblem, top: int, table: CandidateTable
+) -> list[Candidate]:
     """Best places that can be imaged; all that were considered go into a table."""
-    places = question.predicted()
+    places = problem.predicted()
     unseen: list[Candidate] = []
 
     def can_be_imaged(candidate: Candidate) -> bool:
@@ -73,58 +75,58 @@ def _finalists(question: Question, top: int, table: CandidateTable) -> list[Cand
             apart_m(candidate.pose, other.pose) < NEAR_UNSEEN_M for other in unseen
         ):
             return False
-        seen = question.can_be_imaged(candidate.pose)
+        seen = problem.can_be_imaged(candidate.pose)
         if not seen:
             unseen.append(candidate)
         return seen
 
-    found = spread_out(places, top, question.different_place_m, can_be_imaged)
+    found = spread_out(places, top, problem.different_place_m, can_be_imaged)
     for place in places:
         is_unseen = any(place is other for other in unseen)
         table.add(Candidate(pose=place.pose, reason=UNSEEN) if is_unseen else place)
     if unseen and not found:
         raise SceneError(
-            f"{question.loaded.source}: {UNSEEN} at any of the {len(unseen)} best "
+            f"{problem.loaded.source}: {UNSEEN} at any of the {len(unseen)} best "
             f"places; look elsewhere with --heights or --region, or {REMEDY}"
         )
     return found
 
 
-def _improved(question: Question, starts: list[Candidate]) -> list[Pose]:
+def _improved(problem: PlacementProblem, starts: list[Candidate]) -> list[Pose]:
     """Better poses near some places: turned first, then the best of all moved.
 
     A pose counts as better by a quarter of a point.
     """
     if not starts:
         return []
-    evaluator = question.evaluator
+    evaluator = problem.evaluator
     evaluator.expect(MOST_TURNS + REFINE_POSES + SETTLING)
-    best = _turned(question, starts)
+    best = _turned(problem, starts)
     evaluator.expect(REFINE_POSES + SETTLING)
     moved = refine(
         min(best, key=rank_key),
-        question.start,
-        question.region,
-        question.reason_against,
+        problem.start,
+        problem.region,
+        problem.reason_against,
         evaluator,
     )
     return list(dict.fromkeys([moved.pose, *(c.pose for c in best)]))
 
 
-def _turned(question: Question, starts: list[Candidate]) -> list[Candidate]:
+def _turned(problem: PlacementProblem, starts: list[Candidate]) -> list[Candidate]:
     """Each of some candidates, or a better one at the same place."""
     turns = {
         pose: start
         for start in starts
-        for pose in (_with_turn(start.pose, turn, question) for turn in TURNS_DEG)
-        if not question.reason_against(pose)
+        for pose in (_with_turn(start.pose, turn, problem) for turn in TURNS_DEG)
+        if not problem.reason_against(pose)
     }
     above = [
         start.score.score + MIN_GAIN_POINTS
         for start in turns.values()
         if start.score is not None
     ]
-    found = question.exact(list(turns), above=above)
+    found = problem.exact(list(turns), above=above)
     better = [c for c in found if c.score is not None]
     return [
         min([start, *(c for c in better if turns[c.pose] is start)], key=rank_key)
@@ -132,8 +134,8 @@ def _turned(question: Question, starts: list[Candidate]) -> list[Candidate]:
     ]
 
 
-def _with_turn(pose: Pose, turn_deg: float, question: Question) -> Pose:
-    low = float(question.region.low[3])
+def _with_turn(pose: Pose, turn_deg: float, problem: PlacementProblem) -> Pose:
+    low = float(problem.region.low[3])
     yaw = low + (pose[3] + np.radians(turn_deg) - low) % np.pi
     return (*pose[:3], round(float(yaw), 9))
 

@@ -10,7 +10,7 @@ from reachmap.placement.mapped.candidates import Candidate
 from reachmap.placement.mapped.exact import NEVER, Pose
 from reachmap.placement.mapped.sample import QUICK
 from reachmap.placement.predicted.places import rank_key
-from reachmap.placement.problem import Question
+from reachmap.placement.problem import PlacementProblem
 from reachmap.placement.tolerance import (
     NOISE_POINTS,
     WorstCase,
@@ -26,7 +26,7 @@ TRIED, BELOW_POINTS, MOVES = 2, 3.0, 1
 MARGIN_POINTS, LEAST_ERROR = 5.0, 0.1
 
 
-def steadied(question: Question, mapped: list[Candidate]) -> list[Candidate]:
+def steadied(problem: PlacementProblem, mapped: list[Candidate]) -> list[Candidate]:
     """Poses with their worst cases, the one to be chosen first.
 
     The best few are looked at with their neighbours, and each is moved away from what
@@ -36,11 +36,11 @@ def steadied(question: Question, mapped: list[Candidate]) -> list[Candidate]:
 
     Parameters
     ----------
-    question : Question
+    problem : PlacementProblem
     mapped : list of Candidate
         Mapped with the bin in the scene.
     """
-    tolerance = question.tolerance
+    tolerance = problem.tolerance
     scored = sorted((c for c in mapped if c.score is not None), key=rank_key)
     if tolerance.is_none or not scored or scored[0].score is None:
         return []
@@ -48,56 +48,58 @@ def steadied(question: Question, mapped: list[Candidate]) -> list[Candidate]:
     near = [c for c in scored if c.score is not None and c.score.score >= least]
     found: list[tuple[Candidate, WorstCase]] = []
     for candidate in near[:TRIED]:
-        found.append(_looked_at(question, candidate))
+        found.append(_looked_at(problem, candidate))
         for _ in range(MOVES):
             worst = found[-1][1]
             best = max(worst.score for _, worst in found)
-            moved = _moved(question, *found[-1], above=best)
+            moved = _moved(problem, *found[-1], above=best)
             if moved is None:
                 break
-            found.append(_looked_at(question, moved))
+            found.append(_looked_at(problem, moved))
             if found[-1][1].score <= worst.score:
                 break
-    return _in_order(question, [candidate for candidate, _ in found])
+    return _in_order(problem, [candidate for candidate, _ in found])
 
 
-def worst_of(question: Question, candidate: Candidate) -> WorstCase:
+def worst_of(problem: PlacementProblem, candidate: Candidate) -> WorstCase:
     """Worst case of a pose under the tolerance asked for."""
     return worst_case(
         candidate,
-        question.tolerance,
-        question.start,
-        lambda pose: _is_possible(question, pose),
-        question.evaluator,
+        problem.tolerance,
+        problem.start,
+        lambda pose: _is_possible(problem, pose),
+        problem.evaluator,
     )
 
 
-def _looked_at(question: Question, candidate: Candidate) -> tuple[Candidate, WorstCase]:
-    worst = worst_of(question, candidate)
+def _looked_at(
+    problem: PlacementProblem, candidate: Candidate
+) -> tuple[Candidate, WorstCase]:
+    worst = worst_of(problem, candidate)
     return dataclasses.replace(candidate, worst=worst.score), worst
 
 
-def _is_possible(question: Question, pose: Pose) -> bool:
-    return question.fit.contact(question.T_base_bin(pose)) is None
+def _is_possible(problem: PlacementProblem, pose: Pose) -> bool:
+    return problem.fit.contact(problem.T_base_bin(pose)) is None
 
 
 def _moved(
-    question: Question, candidate: Candidate, worst: WorstCase, *, above: float
+    problem: PlacementProblem, candidate: Candidate, worst: WorstCase, *, above: float
 ) -> Candidate | None:
     """A candidate further from its losses, mapped exactly.
 
     None where it cannot be, or where it cannot score above a worst case.
     """
-    pose = away_from_losses(candidate.pose, question.tolerance, worst, NOISE_POINTS)
-    if pose is None or question.reason_against(pose):
+    pose = away_from_losses(candidate.pose, problem.tolerance, worst, NOISE_POINTS)
+    if pose is None or problem.reason_against(pose):
         return None
-    if not question.can_be_imaged(pose):
+    if not problem.can_be_imaged(pose):
         return None
-    (moved,) = question.exact([pose], above=above) or (None,)
+    (moved,) = problem.exact([pose], above=above) or (None,)
     return moved if moved is not None and moved.score is not None else None
 
 
-def _in_order(question: Question, found: list[Candidate]) -> list[Candidate]:
+def _in_order(problem: PlacementProblem, found: list[Candidate]) -> list[Candidate]:
     """Candidates with worst cases, equal ones by margin, paths and squareness."""
     found = sorted(found, key=lambda c: (-(c.worst or 0.0), rank_key(c)))
     best = found[0]
@@ -106,10 +108,10 @@ def _in_order(question: Question, found: list[Candidate]) -> list[Candidate]:
     error = max(float(np.nan_to_num(best.score.error)), LEAST_ERROR)
     equal = [c for c in found if (c.worst or 0.0) >= best.worst - error]
     others = [c for c in found if c not in equal]
-    return [*_by_margin(question, equal), *others]
+    return [*_by_margin(problem, equal), *others]
 
 
-def _by_margin(question: Question, equal: list[Candidate]) -> list[Candidate]:
+def _by_margin(problem: PlacementProblem, equal: list[Candidate]) -> list[Candidate]:
     """Candidates of one worst case, those with a wide margin first.
 
     Those with short paths are looked at first; one that loses nothing in any direction
@@ -120,10 +122,10 @@ def _by_margin(question: Question, equal: list[Candidate]) -> list[Candidate]:
     in_turn = sorted(equal, key=_tie_key)
     lost: dict[Pose, int] = {}
     for candidate in in_turn:
-        lost[candidate.pose] = _directions_lost(question, candidate)
+        lost[candidate.pose] = _directions_lost(problem, candidate)
         if lost[candidate.pose] == 0:
             break
-    most = len(question.tolerance.steps())
+    most = len(problem.tolerance.steps())
     return sorted(in_turn, key=lambda c: lost.get(c.pose, most))
 
 
@@ -134,17 +136,17 @@ def _tie_key(candidate: Candidate) -> tuple[float, float]:
     return round(candidate.score.path_length_rad, 1), round(off_square, 3)
 
 
-def _directions_lost(question: Question, candidate: Candidate) -> int:
+def _directions_lost(problem: PlacementProblem, candidate: Candidate) -> int:
     """In how many directions a step beyond the tolerance costs more than a margin.
 
     Counted by the frames with a free configuration, which takes a fraction of the time
     of paths and approaches; the margin of what is chosen is measured with them.
     """
-    poses = [moved_by(candidate.pose, step) for step in question.tolerance.steps()]
-    possible = [pose for pose in poses if _is_possible(question, pose)]
-    question.evaluator.expect(1 + len(possible))
-    here, *found = question.evaluator.evaluate(
-        [candidate.pose, *possible], question.start, above=NEVER, grid=QUICK
+    poses = [moved_by(candidate.pose, step) for step in problem.tolerance.steps()]
+    possible = [pose for pose in poses if _is_possible(problem, pose)]
+    problem.evaluator.expect(1 + len(possible))
+    here, *found = problem.evaluator.evaluate(
+        [candidate.pose, *possible], problem.start, above=NEVER, grid=QUICK
     )
     held = [e.bound >= here.bound - MARGIN_POINTS for e in found]
     return len(poses) - sum(held)

@@ -61,7 +61,7 @@ class RunFolder:
         the file it was read from.
     missing : mapping of str to str
         Usual name of what is not there, to the command that makes it.
-    doubts : tuple of str
+    warnings : tuple of str
         Files that cannot be read, and files that do not belong together.
     """
 
@@ -73,7 +73,7 @@ class RunFolder:
     validation: Mapping[str, Any] | None = None
     files: Mapping[str, str] = field(default_factory=dict)
     missing: Mapping[str, str] = field(default_factory=dict)
-    doubts: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
 
     @property
     def artefacts(self) -> dict[str, Artefact]:
@@ -98,7 +98,7 @@ class _Reader:
         self.folder = folder
         self.files: dict[str, str] = {}
         self.missing: dict[str, str] = {}
-        self.doubts: list[str] = []
+        self.warnings: list[str] = []
 
     def artefact(self, role: str, read: Callable[[Path], Read]) -> Read | None:
         kind, usual, command = ARTEFACTS[role]
@@ -114,7 +114,7 @@ class _Reader:
                 self.missing[usual] = command
                 if others:
                     names = ", ".join(other.name for other in others)
-                    self.doubts.append(f"none of {names} is called {usual}: left out")
+                    self.warnings.append(f"none of {names} is called {usual}: left out")
                 return None
             path = others[0]
         return self._read(role, path, read)
@@ -131,7 +131,9 @@ class _Reader:
         try:
             record = read(path)
         except ReachmapError as error:
-            self.doubts += [f"not used: {_without(line, path)}" for line in error.lines]
+            self.warnings += [
+                f"not used: {_without(line, path)}" for line in error.lines
+            ]
             return None
         self.files[role] = path.name
         return record
@@ -184,11 +186,11 @@ def read_run_folder(folder: Path) -> RunFolder:
         validation=validation,
         files=reader.files,
         missing=reader.missing,
-        doubts=tuple(reader.doubts),
+        warnings=tuple(reader.warnings),
     )
     if not run.artefacts:
         names = ", ".join(usual for _, usual, _ in ARTEFACTS.values())
-        raise MapFileError([f"{folder}: none of {names} can be used", *reader.doubts])
+        raise MapFileError([f"{folder}: none of {names} can be used", *reader.warnings])
     return run
 
 
@@ -203,7 +205,7 @@ def _ranked_lists(reader: _Reader) -> tuple[Mapping[str, Any], ...]:
         and isinstance(document.get("grasps"), list)
     )
     if found is not None and len(ranked) < len(documents):
-        reader.doubts.append(f"{LISTS['ranked'][0]}: no ranked grasp list, left out")
+        reader.warnings.append(f"{LISTS['ranked'][0]}: no ranked grasp list, left out")
     return ranked
 
 
@@ -212,27 +214,27 @@ def _validation(reader: _Reader) -> Mapping[str, Any] | None:
     if isinstance(found, dict) and isinstance(found.get("lists"), list):
         return found
     if found is not None:
-        reader.doubts.append(f"{LISTS['validation'][0]}: no validation, left out")
+        reader.warnings.append(f"{LISTS['validation'][0]}: no validation, left out")
     return None
 
 
-def chain_doubts(run: RunFolder) -> tuple[str, ...]:
+def chain_warnings(run: RunFolder) -> tuple[str, ...]:
     """Files of a run that were not made from each other, one sentence each."""
-    doubts = []
+    warnings = []
     chain = (("workspace", "placement"), ("placement", "bin"))
     for source, result in chain:
         a, b = run.artefacts.get(source), run.artefacts.get(result)
         if a is None or b is None:
             continue
         if b.provenance.source_sha256 != a.stamp.content_sha256:
-            doubts.append(
+            warnings.append(
                 f"{run.files[result]} was not made from this {run.files[source]}"
             )
     if run.bin_map is not None:
         content = run.bin_map.stamp.content_sha256
         for document in run.ranked:
             if document["reachmap"].get("map_sha256") != content:
-                doubts.append(
+                warnings.append(
                     f"{run.files['ranked']} was not ranked with this {run.files['bin']}"
                 )
-    return tuple(dict.fromkeys(doubts))
+    return tuple(dict.fromkeys(warnings))

@@ -13,7 +13,7 @@ from reachmap.report.answers import headline_answers
 from reachmap.report.blocks import Bullets, Code, Section, Strong
 from reachmap.report.cause_part import cause_section
 from reachmap.report.cell_part import cell_section
-from reachmap.report.folder import RunFolder, chain_doubts
+from reachmap.report.folder import RunFolder, chain_warnings
 from reachmap.report.map_parts import (
     bin_section,
     placement_section,
@@ -112,5 +112,5 @@ def _missing(run: RunFolder) -> list[Bullets]:
         (Strong(name), " is not in this folder; ", Code(how), " makes it")
         for name, how in run.missing.items()
     ]
-    items += [(doubt,) for doubt in [*run.doubts, *chain_doubts(run)]]
+    items += [(warning,) for warning in [*run.warnings, *chain_warnings(run)]]
     return [Bullets(tuple(items))] if items else []

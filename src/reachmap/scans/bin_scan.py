@@ -222,7 +222,7 @@ def plan_from_scratch(
     """Let the cell's planner make all attempts, as in the paper.
 
     They take turns: a machine that is slow for a moment is then slow for one attempt
-    at each of many, and not for every attempt at one, which would look dear.
+    at each of many, and not for every attempt at one, which would look expensive.
     """
     cell, start = scene.loaded.cell, scene.scan_configuration
     windings = Windings(scene.robot)

@@ -10,7 +10,7 @@ from typing import Any
 from reachmap.errors import SettingsError
 from reachmap.studies.design import CHOICE, Factor, Variant, variant_at
 
-# Variants are proposed in rounds of so many, whatever the number of workers, so that
+# Variants are proposed in rounds of this size, whatever the number of workers, so that
 # the same study comes out on any machine.
 ROUND = 4
 # The last part of the budget goes to the neighbours of the best: TPE finds the region,

@@ -16,7 +16,7 @@ from reachmap.core.scene import Scene
 from reachmap.geometry import AXES, inverse_transform, tilt_rad
 from reachmap.placement.mapped.imaging import picture_of
 from reachmap.sampling.frames import approach_distance_m, below_rim_m
-from reachmap.scans.cycle.doubts import cycle_doubts
+from reachmap.scans.cycle.cell_warnings import cycle_warnings
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -151,7 +151,7 @@ def check_loaded(loaded: LoadedCell) -> CellCheck:
         test_grasps=cell.bin_scan.count(),
         approach_m=approach_distance_m(cell),
         below_rim_m=round(below_rim_m(cell), 6),
-        warnings=(*loaded.warnings, *_picture(scene), *cycle_doubts(loaded)),
+        warnings=(*loaded.warnings, *_picture(scene), *cycle_warnings(loaded)),
         problems=scene.scan_problems(),
     )
 

@@ -44,7 +44,7 @@ from reachmap.placement.mapped.exact import Pose
 from reachmap.placement.mapped.imaging import can_choose
 from reachmap.placement.mapped.sample import open_frames
 from reachmap.placement.predicted.region import AXES, Region, region_of
-from reachmap.placement.problem import Question
+from reachmap.placement.problem import PlacementProblem
 from reachmap.placement.search import decide_by_search
 from reachmap.placement.settings import placement_settings
 from reachmap.placement.summary import best_rows, placement_facts, row_facts
@@ -174,12 +174,12 @@ class PlacedBin:
     placement : BinPlacement
     workspace : WorkspaceMap
         Upright.
-    question : Question
+    problem : PlacementProblem
     """
 
     placement: BinPlacement
     workspace: WorkspaceMap
-    question: Question
+    problem: PlacementProblem
 
 
 def placed_bin(
@@ -215,24 +215,24 @@ def placed_bin(
         run,
         progress=Progress("place-bin", quiet=run.quiet),
     ) as evaluator:
-        question = _question(
+        problem = _problem(
             loaded, workspace_map, scene, is_open, region, choice, evaluator
         )
         with clock.phase("decide"):
-            decision = _decide(question, choice)
-            why = why_no_place(question, decision)
+            decision = _decide(problem, choice)
+            why = why_no_place(problem, decision)
             if why and choice.bin_pose is None and choice.rule == "search":
                 raise SceneError(why)
             if why:
                 logger.warning("%s", why)
         with clock.phase("settle"):
-            outcome = settle(question, decision)
+            outcome = settle(problem, decision)
         clock.add_cpu("workers", evaluator.cpu_s if run.workers > 1 else 0.0)
-    placement = _record(question, decision, outcome, choice, clock)
-    return PlacedBin(placement=placement, workspace=workspace_map, question=question)
+    placement = _record(problem, decision, outcome, choice, clock)
+    return PlacedBin(placement=placement, workspace=workspace_map, problem=problem)
 
 
-def _question(
+def _problem(
     loaded: LoadedCell,
     workspace: WorkspaceMap,
     scene: Scene,
@@ -240,14 +240,14 @@ def _question(
     region: Region,
     choice: PlacementChoice,
     evaluator: Evaluator,
-) -> Question:
+) -> PlacementProblem:
     cell = loaded.cell
     keep_scan = choice.keep_scan_configuration or not can_choose(scene)
     fit = BinFit(scene.robot, loaded, scene.scan_configuration if keep_scan else None)
     T_level_world = inverse_transform(cell.T_base_level()) @ cell.T_base_world()
     faces = top_faces(cell, T_level_world)
     supports = supports_in(cell, region, faces, fit)
-    return Question(
+    return PlacementProblem(
         loaded=loaded,
         workspace=workspace,
         is_open=is_open,
@@ -315,14 +315,14 @@ def _region(
     )
 
 
-def _decide(question: Question, choice: PlacementChoice) -> Decision:
+def _decide(problem: PlacementProblem, choice: PlacementChoice) -> Decision:
     if choice.bin_pose is not None:
         x, y, z, yaw_deg = choice.bin_pose
         pose: Pose = (x, y, z, float(np.radians(yaw_deg)))
-        return decide_as_given(question, pose)
+        return decide_as_given(problem, pose)
     if choice.rule == "paper":
-        return decide_by_paper(question)
-    return decide_by_search(question, choice.top)
+        return decide_by_paper(problem)
+    return decide_by_search(problem, choice.top)
 
 
 def _settings(
@@ -342,22 +342,22 @@ def _settings(
 
 
 def _record(
-    question: Question,
+    problem: PlacementProblem,
     decision: Decision,
     outcome: Outcome,
     choice: PlacementChoice,
     clock: RunClock,
 ) -> BinPlacement:
-    table, names = decision.table, question.scene.robot.joint_names
-    T_base_bin = question.T_base_bin(table.rows[outcome.chosen].pose)
+    table, names = decision.table, problem.scene.robot.joint_names
+    T_base_bin = problem.T_base_bin(table.rows[outcome.chosen].pose)
     q = np.array(outcome.scan.q)
-    placed = question.loaded.with_changes(
+    placed = problem.loaded.with_changes(
         bin_pose=T_base_bin,
         scan_configuration_rad=dict(zip(names, q.tolist(), strict=True)),
     )
     scene = Scene.build(placed, with_bin=True)
     scene.require_free_scan_configuration()
-    limit = tool_limit(scene.robot, placed, question.is_open)
+    limit = tool_limit(scene.robot, placed, problem.is_open)
     rule = "given" if choice.bin_pose is not None else choice.rule
     document = scan_document(
         scene,
@@ -368,7 +368,7 @@ def _record(
             "roadmap": placed.cell.roadmap.model_dump(mode="json"),
             "placement": _settings(placed, outcome, choice, limit),
         },
-        source_sha256=question.workspace.stamp.content_sha256,
+        source_sha256=problem.workspace.stamp.content_sha256,
     )
     return BinPlacement(
         bin_pose=T_base_bin,
@@ -378,10 +378,10 @@ def _record(
         paper_choice=outcome.paper_choice,
         rule=rule,
         candidate_pose=table.poses(),
-        tolerance=(question.tolerance.shift_m, question.tolerance.turn_rad),
+        tolerance=(problem.tolerance.shift_m, problem.tolerance.turn_rad),
         worst_score=table.worst(),
         score_error=table.values("error"),
-        support=question.support(table.rows[outcome.chosen].pose),
+        support=problem.support(table.rows[outcome.chosen].pose),
         T_world_base=placed.cell.robot.base_pose.matrix(),
         T_base_level=placed.cell.T_base_level(),
         score=table.values("score"),

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from reachmap.cell.loading import LoadedCell
     from reachmap.cell.model.cell import BinSpec
 
-# All orders of up to so many bins are tried; of more, each bin comes first once.
+# All orders of up to this many bins are tried; of more, each bin comes first once.
 ALL_ORDERS = 3
 
 

@@ -37,7 +37,7 @@ from reachmap.placement.base.mounting import (
     T_level_base_of,
     own_pose,
 )
-from reachmap.placement.base.question import BaseQuestion
+from reachmap.placement.base.problem import BaseProblem
 from reachmap.placement.base.search import search_base
 from reachmap.placement.mapped.evaluator import open_evaluator
 from reachmap.placement.mapped.exact import Pose
@@ -213,7 +213,7 @@ def _searched(
     with open_evaluator(
         levelled, is_open, run, progress=progress, placing=how
     ) as evaluator:
-        question = BaseQuestion(
+        problem = BaseProblem(
             loaded=levelled,
             mounting=how,
             is_open=is_open,
@@ -225,12 +225,12 @@ def _searched(
             fit=BaseFit(levelled, how) if isinstance(how, Mounting) else None,
             evaluator=evaluator,
         )
-        outcome = search_base(question, reach, choice.top)
+        outcome = search_base(problem, reach, choice.top)
     return BaseSearch(
         arm=arm,
         mounting=mounting,
         loaded=loaded,
-        question=question,
+        problem=problem,
         outcome=outcome,
         T_world_level=T_world_level,
         is_own=isinstance(how, RailMounting)

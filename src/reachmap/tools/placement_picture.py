@@ -35,11 +35,11 @@ def draw_placed(path: Path, placed: PlacedBin, run: RunOptions) -> None:
 
 def _camera_view(placed: PlacedBin) -> FloatArray | None:
     """What the camera sees at the height of the rim, shape (4, 2) [m]."""
-    placement, question = placed.placement, placed.question
-    cell, scene = question.loaded.cell, question.scene
+    placement, problem = placed.placement, placed.problem
+    cell, scene = problem.loaded.cell, problem.scene
     if cell.camera is None:
         return None
-    camera = Camera(scene.robot, question.loaded)
+    camera = Camera(scene.robot, problem.loaded)
     T_base_camera = camera.T_base_camera(placement.scan_configuration)
     T_level_camera = inverse_transform(placement.T_base_level) @ T_base_camera
     rim = float(placement.candidate_pose[placement.chosen, 2]) + cell.bin.inner[2]

@@ -132,7 +132,7 @@ def rank(
     force : bool
         Rank even if it was made for another.
     top : int, optional
-        Keep only so many of the best of each list.
+        Keep only this many of the best of each list.
     explain : str, optional
         Id of a grasp whose story is wanted.
     chart : Path, optional

@@ -37,17 +37,17 @@ from reachmap.core.planning.roadmap import START, Goals, Roadmap
 # near by, which finds most of what is easy, and for the two at each component, of which
 # there are many where something is unreachable. Chosen on six hard cells, by checks.
 _LEAST, _FEW, _SOME = 0.05, 0.1, 0.2
-# Where more than this share of the frames is open, a search so many times as long: one
+# Where more than this share of the frames is open, a longer search, by this factor: one
 # passage may open all of it. Of six searches into a cage two end within 20,000 checks,
 # the other four between 24,000 and 39,000.
 _MUCH, _LONG = 0.1, 3
 # What the components that are open at the end share among them, if they are few.
 _LAST = 2.0
-# Where many components stay open, so many searches of samples have their full budget,
+# Where many components stay open, this many searches of samples have their full budget,
 # and the others, which are smaller, a part of it.
 _FULL_SEARCHES, _LEAST_SHARE = 3, 8
-# A tree of LBKPIECE1 that found nothing soon is begun anew; RRTConnect finds 1 of 6
-# frames in a cage when begun anew every 150 checks, and 6 of 6 when it is left to grow.
+# A tree of LBKPIECE1 that found nothing soon is restarted; RRTConnect finds 1 of 6
+# frames in a cage when restarted every 150 checks, and 6 of 6 when it is left to grow.
 _RESTARTS = {"RRTConnect": None}
 _RESTART_CHECKS = 150
 _TURNS_PER_GOAL = 3
@@ -235,9 +235,11 @@ class _Connector:
         if np.mean(~done[frames]) <= _MUCH:
             return False
         budget, spec = _LONG * self._spec.max_checks, self._spec
-        # A search that is begun anew gains little from more of the same.
-        anew = [spec.planners[m] not in _RESTARTS for m in range(len(spec.planners))]
-        order = sorted(range(len(anew)), key=anew.__getitem__)
+        # A search that is restarted gains little from more of the same.
+        restarted = [
+            spec.planners[m] not in _RESTARTS for m in range(len(spec.planners))
+        ]
+        order = sorted(range(len(restarted)), key=restarted.__getitem__)
         return any(self._plan(part, m, budget, 1) for m in order)
 
     def _each_open(self, attempt: Callable[[_Component], bool]) -> None:

@@ -18,7 +18,7 @@ from reachmap.maps import RunClock
 from reachmap.maps.base.record import BasePlacement
 from reachmap.maps.records import Stamp
 from reachmap.placement.base.mounting import RailMounting
-from reachmap.placement.base.question import BaseQuestion
+from reachmap.placement.base.problem import BaseProblem
 from reachmap.placement.base.search import BaseOutcome
 from reachmap.placement.base.settings import base_settings
 from reachmap.placement.decision import NO_ROW
@@ -42,7 +42,7 @@ class BaseSearch:
         Of what is compared.
     loaded : LoadedCell
         With this arm, in its own world.
-    question : BaseQuestion
+    problem : BaseProblem
     outcome : BaseOutcome
     T_world_level : array, shape (4, 4)
     is_own : bool
@@ -52,7 +52,7 @@ class BaseSearch:
     arm: int
     mounting: int
     loaded: LoadedCell
-    question: BaseQuestion
+    problem: BaseProblem
     outcome: BaseOutcome
     T_world_level: FloatArray
     is_own: bool
@@ -206,7 +206,7 @@ def _final_cell(search: BaseSearch) -> LoadedCell:
     scan = search.outcome.scan
     assert scan is not None
     pose = search.pose(search.outcome.chosen)
-    placed = search.question.mounting.final(search.loaded, pose, search.T_world_level)
+    placed = search.problem.mounting.final(search.loaded, pose, search.T_world_level)
     names = RobotModel.from_cell(placed).joint_names
     return placed.with_changes(
         scan_configuration_rad=dict(zip(names, scan.q.tolist(), strict=True))
@@ -217,7 +217,7 @@ def _in_world(searches: Sequence[BaseSearch]) -> tuple[FloatArray, FloatArray]:
     """Places (n, 3) and headings (n,) of all candidates in the world."""
     places, headings = [], []
     for search in searches:
-        how, T = search.question.mounting, search.T_world_level
+        how, T = search.problem.mounting, search.T_world_level
         for row in search.outcome.decision.table.rows:
             if isinstance(how, RailMounting):
                 places.append(np.array([row.pose[0], 0.0, 0.0]))

@@ -15,9 +15,9 @@ from reachmap.core.kinematics.kinematics import Kinematics
 from reachmap.placement.mapped.exact import Pose
 from reachmap.placement.predicted.region import Region
 
-# Reach is that of random configurations; of so many, the longest is short by little.
+# Reach is that of random configurations; the longest of this many is short by little.
 REACH_SAMPLES, REACH_SLACK = 500, 1.02
-# A step is so small a share of the reach, and not smaller than this [m].
+# A step is this share of the reach, and not smaller than this [m].
 STEPS_IN_REACH, LEAST_STEP_M = 7, 0.10
 # Heights beside the present one that are looked at by default [m].
 HEIGHTS_M = 0.30

@@ -9,7 +9,7 @@ import numpy as np
 
 from reachmap._typing import FloatArray
 from reachmap.placement.base.lattice import base_lattice, smoothed
-from reachmap.placement.base.question import DIFFERENT_PLACE_M, BaseQuestion
+from reachmap.placement.base.problem import DIFFERENT_PLACE_M, BaseProblem
 from reachmap.placement.decision import NO_ROW, SETTLING, Decision
 from reachmap.placement.mapped.candidates import Candidate
 from reachmap.placement.mapped.exact import Pose
@@ -45,36 +45,36 @@ class BaseOutcome:
     margin: dict[str, float]
 
 
-def search_base(question: BaseQuestion, reach: float, top: int) -> BaseOutcome:
+def search_base(problem: BaseProblem, reach: float, top: int) -> BaseOutcome:
     """Find the best place, a runner-up elsewhere, and how far the base may be off.
 
     Parameters
     ----------
-    question : BaseQuestion
+    problem : BaseProblem
     reach : float
         See :func:`reachmap.placement.base.lattice.reach_m`.
     top : int
         Different places that are mapped exactly.
     """
     decision = Decision()
-    finalists = _finalists(question, reach, top, decision)
-    own = question.own
-    asked = list(dict.fromkeys([*finalists, *([] if question.contact(own) else [own])]))
-    question.evaluator.expect(len(asked) + REFINE_POSES + SETTLING)
-    mapped = question.exact(asked)
+    finalists = _finalists(problem, reach, top, decision)
+    own = problem.own
+    asked = list(dict.fromkeys([*finalists, *([] if problem.contact(own) else [own])]))
+    problem.evaluator.expect(len(asked) + REFINE_POSES + SETTLING)
+    mapped = problem.exact(asked)
     inside = [
         c
         for c in mapped
-        if c.score is not None and not question.region.outside(np.array(c.pose))
+        if c.score is not None and not problem.region.outside(np.array(c.pose))
     ]
     if inside:
         best = min(inside, key=rank_key)
         better = refine(
             best,
-            question.start,
-            question.region,
-            question.reason_against,
-            question.evaluator,
+            problem.start,
+            problem.region,
+            problem.reason_against,
+            problem.evaluator,
         )
         if better.pose != best.pose:
             mapped.append(better)
@@ -85,20 +85,20 @@ def search_base(question: BaseQuestion, reach: float, top: int) -> BaseOutcome:
         present = row if candidate.pose == own else present
     allowed = {c.pose for c in inside}
     decision.rank(unfit={c.pose for c in mapped if c.pose not in allowed})
-    return _settled(question, decision, present)
+    return _settled(problem, decision, present)
 
 
 def _finalists(
-    question: BaseQuestion, reach: float, top: int, decision: Decision
+    problem: BaseProblem, reach: float, top: int, decision: Decision
 ) -> list[Pose]:
     """Best places by their bounds, far from each other; all go into the table."""
     # x of an arm on a rail is no distance from the bin.
-    is_free = question.fit is not None
-    poses = base_lattice(question.region, question.own, reach, around_bin=is_free)
-    reasons = [question.reason_against(pose) for pose in poses]
+    is_free = problem.fit is not None
+    poses = base_lattice(problem.region, problem.own, reach, around_bin=is_free)
+    reasons = [problem.reason_against(pose) for pose in poses]
     free = [pose for pose, reason in zip(poses, reasons, strict=True) if not reason]
-    question.evaluator.expect(len(free) + top + REFINE_POSES + SETTLING)
-    bounds = question.bounds(free)
+    problem.evaluator.expect(len(free) + top + REFINE_POSES + SETTLING)
+    bounds = problem.bounds(free)
     for pose, reason in zip(poses, reasons, strict=True):
         if reason:
             decision.table.add(Candidate(pose=pose, reason=reason))
@@ -118,18 +118,18 @@ def _finalists(
         if len(asked) >= ASKED_PER_PLACE * top:
             return False
         asked.append(candidate.pose)
-        return question.can_be_imaged(candidate.pose)
+        return problem.can_be_imaged(candidate.pose)
 
     found = spread_out(ranked, top, DIFFERENT_PLACE_M, can_be_imaged)
     return [c.pose for c in found]
 
 
-def _settled(question: BaseQuestion, decision: Decision, present: int) -> BaseOutcome:
+def _settled(problem: BaseProblem, decision: Decision, present: int) -> BaseOutcome:
     rows = decision.table.rows
     for row in decision.ranked:
-        question.evaluator.expect(SETTLING)
+        problem.evaluator.expect(SETTLING)
         pose = rows[row].pose
-        scan = _scan(question, rows[row])
+        scan = _scan(problem, rows[row])
         if scan is None:
             rows[row] = Candidate(pose=pose, exact=True, reason=UNSEEN)
             continue
@@ -145,7 +145,7 @@ def _settled(question: BaseQuestion, decision: Decision, present: int) -> BaseOu
             runner_up=decision.runner_up(pose, DIFFERENT_PLACE_M),
             present=present,
             scan=scan,
-            margin=_margins(question, pose, scan.q),
+            margin=_margins(problem, pose, scan.q),
         )
     return BaseOutcome(
         decision=decision,
@@ -157,22 +157,20 @@ def _settled(question: BaseQuestion, decision: Decision, present: int) -> BaseOu
     )
 
 
-def _scan(question: BaseQuestion, candidate: Candidate) -> ScanChoice | None:
-    if not question.keep_scan:
-        return choose_scan(question.placed(candidate.pose), question.evaluator)
+def _scan(problem: BaseProblem, candidate: Candidate) -> ScanChoice | None:
+    if not problem.keep_scan:
+        return choose_scan(problem.placed(candidate.pose), problem.evaluator)
     assert candidate.score is not None
-    return ScanChoice(
-        q=question.scan_configuration, score=candidate.score, is_new=False
-    )
+    return ScanChoice(q=problem.scan_configuration, score=candidate.score, is_new=False)
 
 
-def _margins(question: BaseQuestion, pose: Pose, q: FloatArray) -> dict[str, float]:
+def _margins(problem: BaseProblem, pose: Pose, q: FloatArray) -> dict[str, float]:
     found = margins(
-        pose, q, lambda moved: question.is_possible(moved, q), question.evaluator
+        pose, q, lambda moved: problem.is_possible(moved, q), problem.evaluator
     )
     # What is fixed has no margin that anybody could use.
     return {
         name: value
         for name, value in found.items()
-        if question.fit is not None or name.lstrip("+-") == "x"
+        if problem.fit is not None or name.lstrip("+-") == "x"
     }

@@ -30,18 +30,18 @@ ORTHOGONALITY_LIMIT: Final = 5e-3
 
 @dataclass(slots=True)
 class Findings:
-    """Mistakes and doubts of one document, each with the path of its value."""
+    """Mistakes and warnings of one document, each with the path of its value."""
 
     mistakes: list[tuple[JsonPath, str]] = field(default_factory=list)
-    doubts: list[tuple[JsonPath, str]] = field(default_factory=list)
+    warnings: list[tuple[JsonPath, str]] = field(default_factory=list)
 
     def mistake(self, path: JsonPath, message: str) -> None:
         """Note something that makes the document unusable."""
         self.mistakes.append((path, message))
 
-    def doubt(self, path: JsonPath, message: str) -> None:
+    def warn(self, path: JsonPath, message: str) -> None:
         """Note something usable that deserves a look."""
-        self.doubts.append((path, message))
+        self.warnings.append((path, message))
 
 
 def shown(value: Any) -> str:
@@ -152,7 +152,7 @@ def _check_quaternion(found: Findings, path: JsonPath, value: Any) -> None:
             path, f"a rotation has length 1 ± {NORM_LIMIT} (got {length:.4g})"
         )
     elif error > NORM_WARNING:
-        found.doubt(path, f"length {math.hypot(*vector):.5f} instead of 1; normalised")
+        found.warn(path, f"length {math.hypot(*vector):.5f} instead of 1; normalised")
 
 
 def _check_matrix(found: Findings, path: JsonPath, value: Any) -> None:
@@ -179,6 +179,6 @@ def _check_matrix(found: Findings, path: JsonPath, value: Any) -> None:
             path, f"not a rotation: its columns are {skew:.2g} off a right angle"
         )
     elif skew > NORM_WARNING:
-        found.doubt(
+        found.warn(
             path, f"columns {skew:.2g} off a right angle; nearest rotation taken"
         )

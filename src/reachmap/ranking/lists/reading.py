@@ -84,9 +84,9 @@ def grasps_from_document(
     found = check_document(document)
     if found.mistakes:
         raise GraspListError(limited(_located(found.mistakes, source, text)))
-    doubts = limited(_located(found.doubts, source, text))
+    located = limited(_located(found.warnings, source, text))
     prefix = f"{source}: "
-    warnings = [*(prefix + note for note in notes), *doubts]
+    warnings = [*(prefix + note for note in notes), *located]
     return arrays_from_document(_without_results(document), source, warnings)
 
 

@@ -32,7 +32,7 @@ def matched_count(ranking: Ranking) -> int:
     return int((~np.isin(ranking.status, [*UNMATCHED])).sum())
 
 
-def list_doubts(
+def plausibility_questions(
     grasps: GraspList, ranking: Ranking, rank: Callable[[GraspList], Ranking]
 ) -> tuple[str, ...]:
     """Ask about the mistake that explains why a list does not fit the map.

@@ -31,7 +31,7 @@ SPARSE: Grid = (3, 3, 3)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class BaseQuestion:
+class BaseProblem:
     """What is asked: an arm, how it is mounted, and where its base may stand.
 
     Attributes

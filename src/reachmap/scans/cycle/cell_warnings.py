@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from reachmap.cell.loading import LoadedCell
 
 
-def cycle_doubts(loaded: LoadedCell) -> list[str]:
+def cycle_warnings(loaded: LoadedCell) -> list[str]:
     """Sentences about a part that has no room, and drop-offs that are out of reach."""
     scenes = CycleScenes.of(loaded)
     if scenes is None:
@@ -23,13 +23,13 @@ def cycle_doubts(loaded: LoadedCell) -> list[str]:
         require_room_for_part(scenes)
     except SceneError as error:
         return list(error.lines)
-    doubts = []
+    warnings = []
     for spec in loaded.cell.drop_offs:
         ways, pair = ways_to_place(scenes, spec)
         if not ways:
             cause = pair or "out of reach, or the straight way leads out of it"
-            doubts.append(
+            warnings.append(
                 f"{loaded.source}: drop_off: nothing can be put down at "
                 f"{spec.name!r} ({cause})"
             )
-    return doubts
+    return warnings
