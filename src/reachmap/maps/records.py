@@ -76,10 +76,7 @@ class Provenance:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunInfo:
-    """How one run went; outside every hash.
-
-    ``wall_s`` and ``cpu_s`` map the name of a phase to seconds.
-    """
+    """How one run went, outside every hash; ``wall_s``, ``cpu_s``: seconds by phase."""
 
     started: str = ""
     finished: str = ""
@@ -240,7 +237,7 @@ class BinMap(ShownBin):
         Roll about the approach axis that the best path takes, where roll is free
         [rad]; NaN without a path.
     T_world_base : array, shape (4, 4), or None
-    components, effort, best, times, margins, cycle
+    components, effort, best, times, margins, cycle, part_corners
         What maps hold since version 1.1; None where the file does not.
     """
 
@@ -284,6 +281,7 @@ class BinMap(ShownBin):
     times: ApproachTimes | None = None
     margins: Margins | None = None
     cycle: Cycle | None = None
+    part_corners: FloatArray | None = None
     T_world_base: FloatArray | None = None
 
     def __post_init__(self) -> None:

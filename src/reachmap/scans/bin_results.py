@@ -223,6 +223,7 @@ def assemble_bin_map(
         winning_roll=None if rolls_are_listed else shaped(results.winning_roll),
         margins=_margins(shaped(results.margins)),
         cycle=cycle.section(document["stages"], known, shaped) if cycle else None,
+        part_corners=_part_corners(document),
         path_reachability=percent,
         scan_configuration=np.array(document["scan_configuration"], float),
         joint_names=tuple(document["joint_names"]),
@@ -232,6 +233,11 @@ def assemble_bin_map(
         provenance=provenance_from_document(document),
         run=run,
     )
+
+
+def _part_corners(document: Mapping[str, Any]) -> FloatArray | None:
+    corners = document.get("part_corners")
+    return None if corners is None else np.array(corners, float)
 
 
 def _of_attempts(results: GraspResults, shaped: Callable[[Any], Any]) -> dict[str, Any]:

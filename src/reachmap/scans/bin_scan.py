@@ -12,6 +12,7 @@ import numpy as np
 
 from reachmap._typing import FloatArray
 from reachmap.cell.model.cell import Cell
+from reachmap.core.collision.held_part import HeldPart
 from reachmap.core.kinematics.windings import Windings
 from reachmap.core.planning.planner import PlanResult
 from reachmap.core.planning.timing import path_length_rad
@@ -115,9 +116,15 @@ def bin_work(scene: Scene, document: Mapping[str, Any]) -> Work:
             "grasps": grasps,
             "fillings": fillings,
             "stages": list(stages_of(scene.loaded)),
+            "part_corners": _part_corners(scene.loaded),
         },
         frames=grasps,
     )
+
+
+def _part_corners(loaded: LoadedCell) -> list[list[float]] | None:
+    part = HeldPart.of(loaded)
+    return None if part is None else part.points.tolist()
 
 
 def pairs_of_fillings(loaded: LoadedCell) -> list[str]:

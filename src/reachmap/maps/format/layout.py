@@ -262,6 +262,13 @@ PERCENT: Final[dict[str, Any]] = {"units": "percent", "low": 0.0, "high": 100.0}
 NONNEGATIVE: Final[dict[str, Any]] = {"low": 0.0, "nan": True}
 
 
+def variable(
+    path: str, dims: tuple[str, ...], dtype: str, meaning: str, **more: Any
+) -> Variable:
+    """Describe a variable of a section."""
+    return Variable(path=path, dims=dims, dtype=dtype, meaning=meaning, **more)
+
+
 def index(path: str, meaning: str, **more: Any) -> Variable:
     """Describe a coordinate that only counts."""
     name = path.rpartition("/")[2]

@@ -1,30 +1,29 @@
-"""What files of version 1.1 may have besides: evidence, effort, margins, cycle."""
+"""What files of version 1.1 may have besides: evidence, effort, margins."""
 
 from __future__ import annotations
 
 from typing import Any, Final
 
+from reachmap.maps.format.cycle_sections import CYCLE_SECTIONS
 from reachmap.maps.format.layout import (
     NONNEGATIVE,
     PERCENT,
     Section,
     Variable,
     index,
+    variable,
 )
 from reachmap.maps.parts import (
     ApproachTimes,
     BestPaths,
     Components,
-    Cycle,
     Effort,
     Margins,
-    StageStatus,
 )
 
 _POINT = ("layer", "y", "x")
 _GRASP = (*_POINT, "orientation")
 _TRY = (*_GRASP, "repeat")
-_STAGE = (*_GRASP, "stage")
 _ONE: Final[dict[str, Any]] = {"units": "1"}
 _POSE_SCALES = (
     index("pose_row", "Rows of a homogeneous matrix."),
@@ -32,14 +31,8 @@ _POSE_SCALES = (
 )
 
 
-def _variable(
-    path: str, dims: tuple[str, ...], dtype: str, meaning: str, **more: Any
-) -> Variable:
-    return Variable(path=path, dims=dims, dtype=dtype, meaning=meaning, **more)
-
-
 def _component(name: str, dtype: str, meaning: str, **more: Any) -> Variable:
-    return _variable(
+    return variable(
         f"components/{name}", ("component",), dtype, meaning, **_ONE, **more
     )
 
@@ -50,7 +43,7 @@ def _pose(name: str, meaning: str, frame: str, *, with_scales: bool = False) -> 
         field=name,
         scales=_POSE_SCALES if with_scales else (),
         arrays={
-            name: _variable(
+            name: variable(
                 name,
                 ("pose_row", "pose_column"),
                 "f8",
@@ -88,7 +81,7 @@ COMPONENTS = Section(
             "1 where an independent method came to the same verdict.",
             is_flag=True,
         ),
-        "method_checks": _variable(
+        "method_checks": variable(
             "components/method_checks",
             ("component", "method"),
             "i4",
@@ -116,7 +109,7 @@ CONFIDENCE = Section(
 COMPONENT = Section(
     field="component",
     arrays={
-        "component": _variable(
+        "component": variable(
             "component",
             _GRASP,
             "i4",
@@ -130,7 +123,7 @@ COMPONENT = Section(
 ROLLS = Section(
     field="",
     arrays={
-        "direction_reachability": _variable(
+        "direction_reachability": variable(
             "direction_reachability",
             _POINT,
             "f8",
@@ -138,7 +131,7 @@ ROLLS = Section(
             nan=True,
             **PERCENT,
         ),
-        "point_reachability": _variable(
+        "point_reachability": variable(
             "point_reachability",
             _POINT,
             "f8",
@@ -152,7 +145,7 @@ ROLLS = Section(
 WINNING_ROLL = Section(
     field="winning_roll",
     arrays={
-        "winning_roll": _variable(
+        "winning_roll": variable(
             "winning_roll",
             _GRASP,
             "f8",
@@ -168,7 +161,7 @@ EFFORT = Section(
     part=Effort,
     numbers={"seconds_per_check": "seconds_per_check"},
     arrays={
-        "checks": _variable(
+        "checks": variable(
             "effort_checks",
             _TRY,
             "u4",
@@ -181,14 +174,14 @@ EFFORT = Section(
 
 
 def _of_best(name: str, units: str, meaning: str) -> Variable:
-    return _variable(name, _GRASP, "f8", meaning, units=units, **NONNEGATIVE)
+    return variable(name, _GRASP, "f8", meaning, units=units, **NONNEGATIVE)
 
 
 BEST = Section(
     field="best",
     part=BestPaths,
     arrays={
-        "row": _variable(
+        "row": variable(
             "best_path",
             _GRASP,
             "i4",
@@ -202,7 +195,7 @@ BEST = Section(
         "execution_time": _of_best(
             "best_execution_time", "s", "execution_time of best_path; NaN: none."
         ),
-        "effort_checks": _variable(
+        "effort_checks": variable(
             "best_effort_checks",
             _GRASP,
             "u4",
@@ -216,7 +209,7 @@ TIMES = Section(
     field="times",
     part=ApproachTimes,
     arrays={
-        "approach": _variable(
+        "approach": variable(
             "approach_time",
             _TRY,
             "f8",
@@ -225,7 +218,7 @@ TIMES = Section(
             units="s",
             **NONNEGATIVE,
         ),
-        "retreat": _variable(
+        "retreat": variable(
             "retreat_time",
             _TRY,
             "f8",
@@ -244,7 +237,7 @@ MARGINS = Section(
         "clearance": _of_best(
             "clearance", "m", "Least distance of two bodies on best_path; NaN: none."
         ),
-        "clearance_pair": _variable(
+        "clearance_pair": variable(
             "clearance_pair",
             _GRASP,
             "i4",
@@ -270,81 +263,9 @@ MARGINS = Section(
 )
 
 
-def _stage(name: str, dtype: str, meaning: str, **more: Any) -> Variable:
-    return _variable(f"cycle/{name}", _STAGE, dtype, meaning, **more)
-
-
-CYCLE = Section(
-    field="cycle",
-    part=Cycle,
-    scales=(index("cycle/stage", "Stages after the grasp.", labels="stages"),),
-    lists={"stages": "stages"},
-    arrays={
-        "status": _stage(
-            "stage_status", "u1", "Outcome of the stage.", codes=StageStatus, **_ONE
-        ),
-        "blocking_pair": _stage(
-            "stage_blocking_pair",
-            "i4",
-            "The two bodies in collision, an index into body_pairs; -1: none.",
-            low=-1,
-            labels="body_pairs",
-            is_index=True,
-            **_ONE,
-        ),
-        "time": _stage(
-            "stage_time", "f8", "Time optimum; NaN: no path.", units="s", **NONNEGATIVE
-        ),
-        "length": _stage(
-            "stage_length",
-            "f8",
-            "Joint-space length; NaN: no path.",
-            units="rad",
-            **NONNEGATIVE,
-        ),
-        "drop_off": _variable(
-            "cycle/drop_off",
-            _GRASP,
-            "i4",
-            "Where the part goes, counted as in the cell; -1: nowhere.",
-            low=-1,
-            **_ONE,
-        ),
-        "cycle_time": _variable(
-            "cycle/cycle_time",
-            _GRASP,
-            "f8",
-            "Time of the whole cycle; NaN unless every stage has a path.",
-            units="s",
-            **NONNEGATIVE,
-        ),
-        "reachability": _variable(
-            "cycle/cycle_reachability",
-            _POINT,
-            "f8",
-            "Share of test grasps with a whole cycle, Eq. (1).",
-            nan=True,
-            **PERCENT,
-        ),
-    },
-)
-
-STAGE_OF_PATH = Section(
-    field="paths.stage",
-    arrays={
-        "stage": _variable(
-            "paths/stage",
-            ("path",),
-            "u1",
-            "0: to the grasp; 1, 2, …: the stages of the cycle, in order.",
-            **_ONE,
-        )
-    },
-)
-
 BIN_SECTIONS = (
     COMPONENT, COMPONENTS, CONFIDENCE, ROLLS, WINNING_ROLL, EFFORT, BEST, TIMES,
-    MARGINS, CYCLE, STAGE_OF_PATH, world(),
+    MARGINS, *CYCLE_SECTIONS, world(),
 )  # fmt: skip
 WORKSPACE_SECTIONS = (
     COMPONENTS,
@@ -364,7 +285,7 @@ PLACEMENT_SECTIONS = (
             ),
         ),
         arrays={
-            "tolerance": _variable(
+            "tolerance": variable(
                 "tolerance",
                 ("tolerance_part",),
                 "f8",
@@ -378,9 +299,7 @@ PLACEMENT_SECTIONS = (
         Section(
             field=name,
             arrays={
-                name: _variable(
-                    name, ("candidate",), "f8", meaning, nan=True, **PERCENT
-                )
+                name: variable(name, ("candidate",), "f8", meaning, nan=True, **PERCENT)
             },
         )
         for name, meaning in (

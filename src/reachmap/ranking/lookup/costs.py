@@ -13,7 +13,6 @@ import numpy as np
 
 from reachmap._typing import BoolArray, FloatArray, IntArray
 from reachmap.ranking.lookup.matching import (
-    TIED_POINTS,
     Matches,
     NearestPoints,
     Queries,
@@ -121,7 +120,7 @@ def blended_terms(
     array, shape (n, k)
         NaN where the nearest test grasp is unreachable.
     """
-    distance, point = _in_order(queries.points, tree, neighbours + 1)
+    distance, point = tree.in_order(queries.points, neighbours + 1)
     weight = 1.0 / np.maximum(matches.distance, MIN_DISTANCE_M)
     total, blend = weight.copy(), phi * weight[:, None]
     worth = worth_of(columns.costs())
@@ -137,15 +136,3 @@ def blended_terms(
         total += weight
         blend += terms * weight[:, None]
     return np.asarray(blend / total[:, None])
-
-
-def _in_order(
-    points: FloatArray, tree: NearestPoints, k: int
-) -> tuple[FloatArray, IntArray]:
-    """Nearest points by distance, equal ones in map order, shapes (n, k)."""
-    distance, point = tree.query(points, k + TIED_POINTS)
-    order = np.lexsort((point, np.round(distance, 9)), axis=1)[:, :k]
-    return (
-        np.take_along_axis(distance, order, axis=1),
-        np.take_along_axis(point, order, axis=1),
-    )

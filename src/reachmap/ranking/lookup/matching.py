@@ -53,6 +53,15 @@ class NearestPoints:
         distance, index = self._grown_tree().query(points, k=k)
         return distance.reshape(-1, k), np.asarray(index, np.int64).reshape(-1, k)
 
+    def in_order(self, points: FloatArray, k: int) -> tuple[FloatArray, IntArray]:
+        """Like :meth:`query`, with points at the same distance in map order."""
+        distance, point = self.query(points, k + TIED_POINTS)
+        order = np.lexsort((point, np.round(distance, 9)), axis=1)[:, :k]
+        return (
+            np.take_along_axis(distance, order, axis=1),
+            np.take_along_axis(point, order, axis=1),
+        )
+
     def _compared(self, points: FloatArray, k: int) -> tuple[FloatArray, IntArray]:
         # One axis at a time: an array (n, k, 3) takes several times as long.
         square = np.zeros((len(points), len(self._points)))
@@ -88,6 +97,8 @@ TIE_M: Final = 1e-6
 TIE_RAD: Final = 1e-6
 # A point of a lattice has at most seven others at the same distance from a grasp.
 TIED_POINTS: Final = 8
+# The test points around a grasp: a cube of three by three by three.
+PASSED_POINTS: Final = 27
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -209,6 +220,43 @@ def match_at(
         distance=distance.copy(),
         angle=_angles(queries, table, point, orientation),
     )
+
+
+def match_past(
+    matches: Matches,
+    rows: IntArray,
+    left_out: BoolArray,
+    queries: Queries,
+    table: GraspTable,
+    tree: NearestPoints,
+    cost: FloatArray,
+) -> Matches:
+    """Match some grasps anew, past test grasps that say nothing about them.
+
+    Parameters
+    ----------
+    matches : Matches
+        From :func:`match`.
+    rows : int array, shape (m,)
+        Grasps that are matched anew; one that has nothing else near stays as it is.
+    left_out : bool array, shape (points, orientations)
+        Test grasps that are passed over.
+    queries, table, tree, cost
+        As in :func:`match`.
+    """
+    if not rows.size:
+        return matches
+    values = {name: getattr(matches, name).copy() for name in Matches.__slots__}
+    some, worth = queries.take(rows), worth_of(cost)
+    distance, point = tree.in_order(some.points, PASSED_POINTS)
+    open_ = np.ones(len(rows), bool)
+    for column in range(point.shape[1]):
+        near = match_at(some, table, point[:, column], distance[:, column], worth)
+        fits = open_ & ~left_out[near.point, near.orientation]
+        for name, column_of in values.items():
+            column_of[rows[fits]] = getattr(near, name)[fits]
+        open_ &= ~fits
+    return Matches(**values)
 
 
 def tied(

@@ -10,9 +10,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from reachmap._typing import CodeArray, FloatArray, IntArray
+from reachmap._typing import BoolArray, CodeArray, FloatArray, IntArray
 from reachmap.errors import MapFileError, SettingsError
 from reachmap.maps.format.bin import read_bin_map
+from reachmap.maps.parts import StageStatus
 from reachmap.maps.records import BinMap, Stamp
 from reachmap.ranking.lookup.calibration import Calibration, usual_calibration
 from reachmap.ranking.lookup.costs import (
@@ -28,6 +29,7 @@ from reachmap.ranking.lookup.matching import (
     NearestPoints,
     Queries,
     match,
+    match_past,
     tied,
 )
 from reachmap.ranking.lookup.order import (
@@ -37,6 +39,7 @@ from reachmap.ranking.lookup.order import (
     Ranking,
     stable_order,
 )
+from reachmap.ranking.lookup.part_room import PartRoom
 from reachmap.ranking.lookup.queries import (
     queries_from_arrays,
     rotations_from_quaternions,
@@ -98,12 +101,8 @@ class Ranker:
         self.calibration = calibration
         self.table: GraspTable = table_from_bin_map(bin_map, basis)
         self.surroundings = Surroundings(self.table)
-        cycle = self.table.cycle
-        self._whole_around = (
-            None
-            if cycle is None
-            else Surroundings(replace(self.table, reachable=cycle.whole))
-        )
+        self._room = PartRoom.of(bin_map, self.table.T_bin_base)
+        self._whole_around, self._held_around = self._cycles_around()
         self.frames: Mapping[str, FloatArray] = frames_of(bin_map)
         self.stamp: Stamp = bin_map.stamp
         self._tree = NearestPoints(self.table.points)
@@ -223,6 +222,10 @@ class Ranker:
         matches = match(queries, table, self._tree, columns.costs())
         outside = outside_map(queries.points, matches.point, table)
         unlike = unlike_map(matches, queries.free, table, settings.max_angle_deg)
+        room = np.ones(len(queries), bool)
+        if settings.cost == "cycle" and self._room is not None:
+            room = self._room.is_there(queries)
+            matches = self._past_walls(queries, matches, columns, room)
         probability = self._probability(queries)
         if settings.cost == "cycle":
             whole = probability * self._share_whole(queries)
@@ -230,10 +233,13 @@ class Ranker:
         else:
             names, terms = self._terms(queries, matches, columns, settings)
         matched = queries.valid & ~outside & ~unlike
-        cost = np.where(matched, terms.sum(axis=1), np.inf)
+        cost = np.where(matched & room, terms.sum(axis=1), np.inf)
         cost[np.isnan(cost)] = np.inf
         reachable = np.isfinite(cost)
         status = _status_of(table, settings)[matches.point, matches.orientation]
+        reached = table.reachable[matches.point, matches.orientation]
+        absent = np.uint8(StageStatus.PART_IN_COLLISION)
+        status = np.where(~room & reached, absent, status)
         status = np.where(unlike, np.uint8(UNLIKE_MAP), status)
         status = np.where(outside, np.uint8(OUTSIDE_MAP), status)
         status = np.where(queries.valid, status, np.uint8(INVALID))
@@ -258,12 +264,37 @@ class Ranker:
         share = self.surroundings.share_reached(queries)
         return share if self.calibration is None else self.calibration(share)
 
+    def _cycles_around(self) -> tuple[Surroundings | None, Surroundings | None]:
+        """Share with a whole cycle around any grasp, and share that it is of."""
+        table = self.table
+        if table.cycle is None:
+            return None, None
+        held = table.reachable.copy()
+        if self._room is not None:
+            # Whether the part has room is known of each grasp, not guessed from others.
+            held &= table.cycle.status != StageStatus.PART_IN_COLLISION
+        return (
+            Surroundings(replace(table, reachable=table.cycle.whole)),
+            Surroundings(replace(table, reachable=held)),
+        )
+
+    def _past_walls(
+        self, queries: Queries, matches: Matches, columns: Columns, room: BoolArray
+    ) -> Matches:
+        """Matches past test grasps without room for the part, where a grasp has it."""
+        absent = cycle_of(self.table).status == StageStatus.PART_IN_COLLISION
+        rows = np.flatnonzero(room & absent[matches.point, matches.orientation])
+        return match_past(
+            matches, rows, absent, queries, self.table, self._tree, columns.costs()
+        )
+
     def _share_whole(self, queries: Queries) -> FloatArray:
-        """Share of what is reached around each grasp that has a whole cycle, (n,)."""
+        """Share of what is held around each grasp that has a whole cycle, (n,)."""
         assert self._whole_around is not None
+        assert self._held_around is not None
         whole = self._whole_around.share_reached(queries)
-        reached = self.surroundings.share_reached(queries)
-        return np.minimum(whole / np.maximum(reached, 1e-9), 1.0)
+        held = self._held_around.share_reached(queries)
+        return np.minimum(whole / np.maximum(held, 1e-9), 1.0)
 
     def tied(self, query: Queries) -> tuple[IntArray, IntArray]:
         """Points and orientations of the test grasps that tie for one grasp."""
