@@ -12,9 +12,11 @@ import pytest
 from reachmap.cell.loading import cell_from_json, read_cell
 from reachmap.core.planning.lift import Lifts
 from reachmap.errors import SceneError
+from reachmap.geometry import rotation_from_quaternion_wxyz, transform_from_parts
 from reachmap.maps import Status, read_bin_map
 from reachmap.maps.parts import StageStatus
 from reachmap.runtime.options import RunOptions
+from reachmap.scans.cycle.fresh import FreshCycles
 from reachmap.scans.cycle.scenes import STAGES, CycleScenes
 from reachmap.tools.bin_scan import bin_scan
 from reachmap.tools.check import check
@@ -147,6 +149,14 @@ def test_the_arm_returns_by_way_of_home(tmp_path):
         assert np.abs(back - q_home).max(axis=1).min() < 1e-9
         time = trapezoid_s(back[0], q_home) + trapezoid_s(q_home, back[-1])
         assert record.cycle.time[(*grasp, 4)] == pytest.approx(time)
+    scenes = CycleScenes.of(loaded_from(record))
+    assert scenes is not None
+    at = tuple(grasp)
+    R = rotation_from_quaternion_wxyz(record.quaternion_wxyz[at])
+    T = transform_from_parts(R, record.position[at[:3]])
+    fresh = FreshCycles(scenes).plan(T[None], seed=1)
+    # On the branch that is nearest, and by way of home, too.
+    assert fresh.seconds >= record.cycle.cycle_time[at] - 1e-6
 
 
 @pytest.mark.slow

@@ -22,6 +22,7 @@ from reachmap.plots.parts.squares import (
     colour_bar,
     draw_squares,
     number_size,
+    percent_text,
 )
 from reachmap.plots.parts.style import (
     COST_MAP,
@@ -155,6 +156,8 @@ class _Panel:
     percent: bool = False
 
     def text(self, value: float) -> str:
+        if self.percent:
+            return percent_text(value)
         return MISSING if np.isnan(value) else f"{value:.{self.digits}f}"
 
 

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from reachmap.maps.cycle.summary import CycleEnd, summarise_cycle
 from reachmap.maps.records import BinMap, Status, WorkspaceMap
-from reachmap.maps.summary.statistics import STATUS_NAMES, causes_of
+from reachmap.maps.summary.statistics import STATUS_NAMES, Causes, causes_of
 from reachmap.plots.approach import STATUS_COLOURS
 from reachmap.plots.parts.context import context_of
 from reachmap.plots.parts.style import (
@@ -22,42 +25,45 @@ from reachmap.plots.parts.style import (
 PAIRS_SHOWN = 10
 LETTERS = 40
 LEFT, RIGHT, WIDTH, ROW = 2.9, 0.9, 4.6, 0.27
+TOP, GAP, BOTTOM = 1.15, 0.75, 0.55
+LOST = STATUS_COLOURS[Status.APPROACH_BLOCKED]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Block:
+    """Bars with a title over them: name, percent and colour of each."""
+
+    title: str
+    bars: list[tuple[str, float, str]]
 
 
 @drawing()
 def draw_causes(record: WorkspaceMap | BinMap) -> Figure:
-    """Draw the states of all test frames, and the pairs of bodies that block most."""
+    """Draw the states of all test frames, and the pairs of bodies that block most.
+
+    Of a bin map with cycles also where these end before the robot is back.
+    """
     causes = causes_of(record)
-    shown = causes.pairs[:PAIRS_SHOWN]
-    lower = ROW * max(len(shown), 1)
-    upper = ROW * max(len(causes.states), 1)
-    height = 0.55 + lower + 0.75 + upper + 1.15
-    figure = new_figure(LEFT + WIDTH + RIGHT, height)
-    first = axes_at(figure, LEFT, 0.55 + lower + 0.75, WIDTH, upper)
     total = max(sum(causes.states.values()), 1)
-    _draw_bars(
-        first,
-        [STATUS_NAMES[code] for code in causes.states],
-        [100.0 * count / total for count in causes.states.values()],
-        [STATUS_COLOURS[code] for code in causes.states],
-    )
     kind = "test grasps" if isinstance(record, BinMap) else "test frames"
-    first.set_title(f"{kind} [%]", loc="left", pad=5)
-    second = axes_at(figure, LEFT, 0.55, WIDTH, lower)
-    _draw_bars(
-        second,
-        [_short(pair) for pair, _ in shown] or ["nothing is blocked"],
-        [100.0 * count / total for _, count in shown] or [0.0],
-        [STATUS_COLOURS[Status.IK_IN_COLLISION]] * max(len(shown), 1),
+    blocks = _blocks(record, causes, total, kind)
+    heights = [ROW * max(len(block.bars), 1) for block in blocks]
+    figure = new_figure(
+        LEFT + WIDTH + RIGHT, sum(heights) + GAP * len(blocks) + TOP - GAP + BOTTOM
     )
-    second.set_title(f"bodies in collision [% of the {kind}]", loc="left", pad=5)
+    bottom = BOTTOM
+    for block, height in reversed(list(zip(blocks, heights, strict=True))):
+        axes = axes_at(figure, LEFT, bottom, WIDTH, height)
+        names, values, colours = zip(*block.bars, strict=True)
+        _draw_bars(axes, list(names), list(values), list(colours))
+        axes.set_title(block.title, loc="left", pad=5)
+        bottom += height + GAP
     reached = 100.0 * causes.states.get(Status.PATH_FOUND, 0) / total
-    more = len(causes.pairs) - len(shown)
-    name = context_of(record.provenance).name
+    more = len(causes.pairs) - PAIRS_SHOWN
     said = (
         f"{causes.total} {kind} attempted",
         f"{more} more pairs of bodies" if more > 0 else "",
-        name,
+        context_of(record.provenance).name,
     )
     put_title(
         figure,
@@ -68,10 +74,50 @@ def draw_causes(record: WorkspaceMap | BinMap) -> Figure:
     return figure
 
 
+def _blocks(
+    record: WorkspaceMap | BinMap, causes: Causes, total: int, kind: str
+) -> list[_Block]:
+    blocked = STATUS_COLOURS[Status.IK_IN_COLLISION]
+    shown = causes.pairs[:PAIRS_SHOWN]
+    blocks = [
+        _Block(
+            title=f"{kind} [%]",
+            bars=[
+                (STATUS_NAMES[code], 100.0 * count / total, STATUS_COLOURS[code])
+                for code, count in causes.states.items()
+            ],
+        ),
+        _Block(
+            title=f"bodies in collision [% of the {kind}]",
+            bars=[
+                (_short(pair), 100.0 * count / total, blocked) for pair, count in shown
+            ]
+            or [("nothing is blocked", 0.0, blocked)],
+        ),
+    ]
+    cycle = summarise_cycle(record) if isinstance(record, BinMap) else None
+    if cycle is not None and cycle.ends:
+        blocks.append(
+            _Block(
+                title=f"reached, but no whole cycle [% of the {kind}]",
+                bars=[
+                    (_short(_end_name(end)), 100.0 * end.grasps / total, LOST)
+                    for end in cycle.ends[:PAIRS_SHOWN]
+                ],
+            )
+        )
+    return blocks
+
+
 def _short(pair: str) -> str:
     """Name a pair in as many letters as fit beside its bar."""
     name = pair.replace(" | ", " – ")
     return name if len(name) <= LETTERS else f"{name[: LETTERS - 1]}…"
+
+
+def _end_name(end: CycleEnd) -> str:
+    """The bodies in the way of a stage, or what became of it."""
+    return f"{end.stage}: {end.pair or end.status}"
 
 
 def _draw_bars(

@@ -54,6 +54,7 @@ class FreshCycles:
             way for spec in drop_offs for way in ways_to_place(scenes, spec)[0]
         ]
         self._before = np.array([way[0] for way, _ in self._places])
+        self._home = scenes.home()
 
     def plan(self, T_base_tcp: FloatArray, seed: int) -> FreshCycle:
         """Plan the cycle over one grasp.
@@ -121,12 +122,25 @@ class FreshCycles:
         if transfer.path is None:
             return StageStatus.TRANSFER_NOT_FOUND, ()
         place, retreat = self._places[transfer.goal]
-        back = scene.planner.plan(retreat[-1], scene.scan_configuration[None], seed)
-        if back.path is None:
+        back = self._back(retreat[-1], seed)
+        if back is None:
             return StageStatus.RETURN_NOT_FOUND, ()
         return StageStatus.PATH_FOUND, (
             carried.time_law.path_time_s(transfer.path),
             carried.time_law.way_time_s(place),
             scene.time_law.way_time_s(retreat),
-            scene.time_law.path_time_s(back.path),
+            scene.time_law.path_time_s(back),
         )
+
+    def _back(self, q: FloatArray, seed: int) -> FloatArray | None:
+        """Path to the scan configuration, by way of where the arm is to return to."""
+        scene, path = self._scenes.empty, q[None]
+        stops = [scene.scan_configuration]
+        if self._home is not None:
+            stops.insert(0, self._home)
+        for stop in stops:
+            plan = scene.planner.plan(path[-1], stop[None], seed)
+            if plan.path is None:
+                return None
+            path = np.vstack([path, plan.path[1:]])
+        return path
