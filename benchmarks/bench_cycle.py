@@ -8,19 +8,21 @@ their own):
   which the part would start inside the bin are no grasps of that part, and counted
   apart;
 - CPU time of the scan with and without the part, in one run (cells only);
-- precision and recall of the nearest test grasp's cycle against planning without a
-  map (:mod:`reachmap.scans.cycle.fresh`), on random grasps anywhere in the bin;
+- stored cycles replayed by code that shares nothing with the planner;
+- precision and recall of ``rank --cost cycle`` against planning without a map
+  (:mod:`reachmap.scans.cycle.fresh`), on random grasps anywhere in the bin, and how
+  the first ten of lists do in supplied order, by J and by seconds;
 - the time of planned segments over the least that is known between the same ends: of
   six plans, each shortened three times as long as the scan does.
 
-``--grid X,Y`` scans a coarser grid, ``--random N`` and ``--sample N`` set the number
-of random grasps and of cycles that are compared.
+``--grid X,Y`` scans a coarser grid; ``--random N``, ``--sample N`` and ``--replay N``
+set the number of random grasps, of cycles that are compared and of those replayed.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
+import sys
 import tempfile
 import time
 from collections import Counter
@@ -28,22 +30,34 @@ from pathlib import Path
 
 import numpy as np
 
-from reachmap._typing import FloatArray, IntArray
-from reachmap.cell.loaded import LoadedCell
-from reachmap.core.planning.routes import shorten_until
-from reachmap.core.scene import Scene
-from reachmap.maps import BinMap, Status, read_bin_map
-from reachmap.maps.parts import StageStatus
-from reachmap.maps.provenance import cell_of_artefact
-from reachmap.ranking import GraspList, Ranker, grasps_from_document, rank_list
-from reachmap.runtime.options import RunOptions
-from reachmap.scans.cycle.fresh import FreshCycles
-from reachmap.scans.cycle.scenes import RETURN, STAGES, TRANSFER, CycleScenes
-from reachmap.tools.bin_scan import bin_scan
-from reachmap.validation.picks import picks_of, tool_poses
-from reachmap.validation.random_grasps import random_grasps
+ROOT = Path(__file__).parents[1]
+sys.path.insert(0, str(ROOT))
 
-HARD = Path(__file__).parent / "hard_cells"
+from reachmap._typing import FloatArray, IntArray  # noqa: E402
+from reachmap.cell.loaded import LoadedCell  # noqa: E402
+from reachmap.core.planning.routes import shorten_until  # noqa: E402
+from reachmap.core.scene import Scene  # noqa: E402
+from reachmap.maps import BinMap, Status, read_bin_map  # noqa: E402
+from reachmap.maps.parts import StageStatus  # noqa: E402
+from reachmap.maps.provenance import cell_of_artefact  # noqa: E402
+from reachmap.ranking import Ranker, RankSettings, rank_list  # noqa: E402
+from reachmap.runtime.options import IN_PROCESS, RunOptions  # noqa: E402
+from reachmap.runtime.progress import Progress  # noqa: E402
+from reachmap.scans.cycle.scenes import (  # noqa: E402
+    RETURN,
+    STAGES,
+    TRANSFER,
+    CycleScenes,
+)
+from reachmap.tools.bin_scan import bin_scan  # noqa: E402
+from reachmap.validation.cycle_planning import plan_cycles  # noqa: E402
+from reachmap.validation.cycles import judge_cycles, summarise_cycles  # noqa: E402
+from reachmap.validation.picks import join_picks, picks_of  # noqa: E402
+from reachmap.validation.planning import PickContext  # noqa: E402
+from reachmap.validation.random_grasps import random_grasps  # noqa: E402
+from tests.support.cycle_replay import Replay, faults_of  # noqa: E402
+
+HARD = ROOT / "benchmarks" / "hard_cells"
 PLATE = "part={shape: {box: [0.08, 0.05, 0.04]}, pose: {xyz: [0, 0, 0.02]}, yaw: free}"
 BLOCK = "part={shape: {box: [0.06, 0.04, 0.04]}, pose: {xyz: [0, 0, 0.02]}, yaw: free}"
 PLACE = "drop_off={{pose: {{xyz: {}, rpy_deg: [180, 0, 0]}}, free_about: z}}"
@@ -62,6 +76,7 @@ CASES: dict[str, tuple[str, ...]] = {
 }  # fmt: skip
 ROLLS = 24
 PLANS = 6
+EACH, TOP = 30, 10
 
 
 def main() -> None:
@@ -71,6 +86,8 @@ def main() -> None:
     parser.add_argument("--grid")
     parser.add_argument("--random", type=int, default=200)
     parser.add_argument("--sample", type=int, default=20)
+    parser.add_argument("--replay", type=int, default=20)
+    parser.add_argument("--seed", type=int, default=1)
     asked = parser.parse_args()
     grid = (f"bin_scan.grid=[{asked.grid}]",) if asked.grid else ()
     for case in asked.cases or CASES:
@@ -81,7 +98,8 @@ def main() -> None:
         else:
             record = scanned(name, (*CASES.get(name, ()), *grid))
         refuted(record)
-        against_fresh_plans(record, asked.random)
+        replayed(record, asked.replay)
+        against_fresh_plans(record, asked.random, asked.seed)
         over_the_best_known(record, asked.sample)
 
 
@@ -165,46 +183,64 @@ def levels_of(record: BinMap) -> tuple[LoadedCell, ...]:
     return cell_of_artefact(record.provenance, "map", ()).fillings()
 
 
-def against_fresh_plans(record: BinMap, count: int) -> None:
-    """Print precision and recall on random grasps."""
-    grasps = on_layers(record, count)
-    ranked = rank_list(grasps, Ranker(record))
-    picks, nearest = picks_of(ranked), ranked.ranking.test_grasp
-    levels = levels_of(record)
-    fresh: dict[int, FreshCycles] = {}
-    assert record.cycle is not None
-    whole = (record.cycle.status == StageStatus.PATH_FOUND).all(axis=-1)
-    table = np.zeros((2, 2), int)
-    missed: Counter[str] = Counter()
-    for row in range(len(picks)):
-        level = int(nearest[row, 0]) if len(levels) > 1 else 0
-        if level not in fresh:
-            scenes = CycleScenes.of(levels[level])
-            assert scenes is not None
-            fresh[level] = FreshCycles(scenes)
-        T = tool_poses(picks, row, rolls=ROLLS, approach_axis=record.approach_axis)
-        verdict = fresh[level].plan(T, seed=row).status
-        said, true = bool(whole[tuple(nearest[row])]), verdict == StageStatus.PATH_FOUND
-        table[int(said), int(true)] += 1
-        if said and not true:
-            missed[verdict.name.lower()] += 1
-    (_, false_no), (false_yes, yes) = table
-    print(
-        f"  {len(picks)} random grasps: precision {yes}/{yes + false_yes} = "
-        f"{yes / max(yes + false_yes, 1):.3f}, recall {yes}/{yes + false_no} = "
-        f"{yes / max(yes + false_no, 1):.3f}; said and not found: {dict(missed)}"
+def against_fresh_plans(record: BinMap, count: int, seed: int) -> None:
+    """Print precision and recall on random grasps, and what comes first in lists.
+
+    Grasps anywhere in the mapped volume, with the bin filled up to each of a cell that
+    is scanned at levels, in lists as one image would give them.
+    """
+    ranker, asked = Ranker(record), RankSettings(cost="cycle")
+    drawn = [random_grasps(record, EACH, seed * 1000 + k) for k in range(count // EACH)]
+    ranked = [rank_list(one, ranker) for one in drawn]
+    context = PickContext(
+        loaded=cell_of_artefact(record.provenance, "map", ()),
+        picks=join_picks([picks_of(one) for one in ranked]),
+        rolls=ROLLS,
+        repeats=1,
+        seed=seed,
     )
+    results = plan_cycles(context, IN_PROCESS, progress=Progress("fresh", quiet=True))
+    assert results is not None
+    judged = [
+        judge_cycles(one, ranker, asked, results.take(slice(EACH * k, EACH * (k + 1))))
+        for k, one in enumerate(ranked)
+    ]
+    summary = summarise_cycles([str(k) for k in range(len(judged))], judged, TOP)[-1]
+    told = summary.confusion
+    print(
+        f"  {len(context.picks)} random grasps, seed {seed}: precision "
+        f"{told.precision.share:.3f}, recall {told.recall.share:.3f}, rank correlation "
+        f"of seconds {summary.correlation.spearman:.2f}"
+    )
+    missed = Counter(
+        StageStatus(int(code)).name.lower()
+        for one in judged
+        for code in one.status[np.isfinite(one.predicted_s) & ~one.found]
+    )
+    print(f"  said and not found: {dict(missed)}")
+    for name, first in summary.orders.items():
+        print(
+            f"  first {TOP} of each list of {EACH}, {name}: {first.whole} of "
+            f"{first.considered} have a whole cycle, {first.seconds:.2f} s on average"
+        )
 
 
-def on_layers(record: BinMap, count: int) -> GraspList:
-    """Random grasps at the heights of the layers: a part lies on what is below it."""
-    listed = random_grasps(record, count, seed=1)
-    document = json.loads(json.dumps(listed.document))
-    for grasp in document["grasps"]:
-        x, y, z = grasp["position"]
-        nearest = float(record.layer[np.argmin(np.abs(record.layer - z))])
-        grasp["position"] = [x, y, nearest]
-    return grasps_from_document(document, source=f"random {count}")
+def replayed(record: BinMap, count: int) -> None:
+    """Replay stored cycles by code that shares nothing with the planner."""
+    levels = levels_of(record)
+    replays = [Replay(level, record.joint_names) for level in levels]
+    known: list[dict[bytes, list[str]]] = [{} for _ in levels]
+    assert record.cycle is not None
+    chosen = np.argwhere(record.cycle.drop_off >= 0)
+    rows = np.random.default_rng(2).permutation(len(chosen))[:count]
+    faults: list[str] = []
+    for grasp in chosen[rows]:
+        level = int(grasp[0]) if len(levels) > 1 else 0
+        faults += faults_of(replays[level], record, grasp, 1 / 3, known[level])
+    print(
+        f"  replayed {len(rows)} whole cycles, {sum(map(len, known))} different paths, "
+        f"at a third of the verification distance: {faults or 'nothing collides'}"
+    )
 
 
 def over_the_best_known(record: BinMap, count: int) -> None:

@@ -175,10 +175,11 @@ class Replay:
             if frozenset((self.names[a], self.names[b])) not in allowed
         ]
 
-    def placed(self, q: Any) -> list[Any]:
-        """World pose of every body."""
-        known = {WORLD: np.eye(4)}
-        values = dict(zip(self.joint_names, q, strict=True))
+    def placed(self, Q: Any) -> list[Any]:
+        """World poses (m, 4, 4) of every body at configurations (m, dof)."""
+        one = np.tile(np.eye(4), (len(Q), 1, 1))
+        known = {WORLD: one}
+        values = dict(zip(self.joint_names, np.asarray(Q).T, strict=True))
         locked = self.cell["robot"]["locked_joints_deg"]
         base = pose_of(self.cell["robot"]["base_pose"])
 
@@ -186,19 +187,21 @@ class Replay:
             if link not in known:
                 joint = self.joints.get(link)
                 if joint is None:
-                    known[link] = base
+                    known[link] = one @ base
                 else:
                     known[link] = of(joint.find("parent").get("link")) @ motion(joint)
             return known[link]
 
         def motion(joint: Any) -> Any:
             origin, name = joint.find("origin"), joint.get("name")
-            T = pose(numbers(origin, "xyz"), numbers(origin, "rpy"))
-            value = values.get(name, np.radians(locked.get(name, 0.0)))
+            T = one @ pose(numbers(origin, "xyz"), numbers(origin, "rpy"))
+            value = values.get(name, np.full(len(Q), np.radians(locked.get(name, 0.0))))
             if joint.get("type") in ("revolute", "continuous"):
                 axis = numbers(joint.find("axis"), "xyz")
-                turn = np.eye(4)
-                turn[:3, :3] = Rotation.from_rotvec(axis * value).as_matrix()
+                turn = one.copy()
+                turn[:, :3, :3] = Rotation.from_rotvec(
+                    axis * value[:, None]
+                ).as_matrix()
                 T = T @ turn
             return T
 
@@ -206,7 +209,7 @@ class Replay:
 
     def distances(self, q: Any, pairs: Any) -> list[float]:
         """Signed distance of each of some pairs [m]."""
-        T = [transform(M) for M in self.placed(q)]
+        T = [transform(M[0]) for M in self.placed(q[None])]
         found = []
         for a, b in pairs:
             result = coal.DistanceResult()
@@ -215,21 +218,31 @@ class Replay:
             found.append(result.min_distance)
         return found
 
-    def hits(self, q: Any, *, part: bool, skip: Any = ()) -> list[str]:
-        """Pairs that collide; without the part where it is not held."""
-        T = [transform(M) for M in self.placed(q)]
-        found = []
+    def hits(self, Q: Any, *, part: bool, skip: Any = ()) -> list[str]:
+        """Pairs that collide at the first of configurations (m, dof) where any does.
+
+        Without the part where it is not held. Boxes that do not meet settle most pairs.
+        """
+        placed = self.placed(Q)
+        boxes = [box(shape, T) for shape, T in zip(self.shapes, placed, strict=True)]
+        found: dict[int, list[str]] = {}
         for a, b in self.pairs:
             name = f"{self.names[a]} | {self.names[b]}"
             if (not part and "part" in (self.names[a], self.names[b])) or name in skip:
                 continue
-            result = coal.CollisionResult()
-            if coal.collide(
-                self.shapes[a], T[a], self.shapes[b], T[b],
-                coal.CollisionRequest(), result,
-            ):  # fmt: skip
-                found.append(name)
-        return found
+            (low_a, high_a), (low_b, high_b) = boxes[a], boxes[b]
+            for row in np.flatnonzero(
+                ((low_a <= high_b) & (low_b <= high_a)).all(axis=1)
+            ):
+                result = coal.CollisionResult()
+                if coal.collide(
+                    self.shapes[a], transform(placed[a][row]),
+                    self.shapes[b], transform(placed[b][row]),
+                    coal.CollisionRequest(), result,
+                ):  # fmt: skip
+                    found.setdefault(int(row), []).append(name)
+                    break
+        return found[min(found)] if found else []
 
     def pair(self, first: str, second: str) -> tuple[int, int]:
         """Indices of two bodies."""
@@ -239,7 +252,7 @@ class Replay:
         """World position of the TCP, (3,)."""
         k = self.names.index("part")
         back = np.linalg.inv(pose_of(self.cell["part"]["pose"]))
-        return (self.placed(q)[k] @ back)[:3, 3]
+        return (self.placed(q[None])[k][0] @ back)[:3, 3]
 
 
 def transform(T: Any) -> Any:
@@ -247,6 +260,15 @@ def transform(T: Any) -> Any:
     return coal.Transform3s(
         np.ascontiguousarray(T[:3, :3]), np.ascontiguousarray(T[:3, 3])
     )
+
+
+def box(shape: Any, T: Any) -> tuple[Any, Any]:
+    """Corners (m, 3) of boxes around a shape at poses (m, 4, 4)."""
+    shape.computeLocalAABB()
+    low, high = np.array(shape.aabb_local.min_), np.array(shape.aabb_local.max_)
+    centre = T[:, :3, :3] @ ((low + high) / 2) + T[:, :3, 3]
+    half = np.abs(T[:, :3, :3]) @ ((high - low) / 2)
+    return centre - half, centre + half
 
 
 def dense(path: Any, step_m: float, reach_m: float = 1.2) -> Any:
@@ -276,18 +298,24 @@ def paths_by_stage(record: Any, grasp: Any) -> dict[int, Any]:
 
 def faults_of_cycle(loaded: Any, record: Any, grasp: Any, share: float = 1 / 3) -> Any:
     """Everything wrong with one stored cycle, in words."""
-    replay = Replay(loaded, record.joint_names)
+    return faults_of(Replay(loaded, record.joint_names), record, grasp, share, {})
+
+
+def faults_of(
+    replay: Replay, record: Any, grasp: Any, share: float, known: dict[bytes, Any]
+) -> list[str]:
+    """The same with a replay at hand; ``known`` keeps what paths were found to hit."""
     cell, faults = replay.cell, []
     step_m = share * cell["collision"]["verification_distance_m"]
     stages = paths_by_stage(record, grasp)
     for stage, path in sorted(stages.items()):
         held = 1 <= stage <= 3
         skip = ("part | bin bottom", "part | bin heap") if stage == 1 else ()
-        for q in dense(path, step_m):
-            hits = replay.hits(q, part=held, skip=skip)
-            if hits:
-                faults.append(f"stage {stage}: {hits}")
-                break
+        key = path.tobytes()
+        if key not in known:
+            known[key] = replay.hits(dense(path, step_m), part=held, skip=skip)
+        if known[key]:
+            faults.append(f"stage {stage}: {known[key]}")
         if stage > 0:
             gap = np.abs(path[0] - stages[stage - 1][-1]).max()
             if gap > 1e-9:
