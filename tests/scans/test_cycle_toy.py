@@ -235,6 +235,9 @@ def test_lifts_of_a_given_length(tmp_path):
     [
         (("bin_scan.layers=[0.02]",), "10 mm or more inside the bin bottom at all 20"),
         (("part.shape={box: [0.03, 0.02, 0.06]}",), "starts inside a wall at all 20"),
+        (("part={shape: {box: [0.03, 0.3, 0.3]}, pose: {xyz: [0.015, 0, 0]}}",
+          "tool.roll=free"),
+         "wall at all 20 test grasps, however the tool is turned"),
         (("cycle.return_to={q_deg: {joint_1: 0, joint_2: 0, joint_3: 0}}",
           "bodies.post.pose.xyz=[0.2, 0, 0]"),
          "cycle.return_to: link_1 touches post"),
@@ -261,10 +264,11 @@ def test_check_says_so_before_any_scan(override, message):
     assert "part" in [row.name for row in answer.bodies]
 
 
-def test_a_place_out_of_reach_is_a_result(tmp_path):
-    """Grasps and lifts stay; the stage that fails has the status."""
+def test_a_place_out_of_reach_is_a_result(tmp_path, caplog):
+    """Grasps and lifts stay; the stage that fails has the status; said beforehand."""
     far = "drop_off={pose: {xyz: [5, 0, 0]}}"
     record = scan(tmp_path, far, "bin_scan.grid=[3, 1]")
+    assert "nothing can be put down at 'drop-off' (out of reach" in caplog.text
     status = record.cycle.status[record.status == Status.PATH_FOUND]
     assert (status[:, 0] == StageStatus.PATH_FOUND).all()
     assert (status[:, STAGES.index("place")] == StageStatus.DROP_OFF_UNREACHABLE).all()

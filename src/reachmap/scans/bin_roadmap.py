@@ -23,7 +23,7 @@ from reachmap.sampling.frames import (
     bin_test_frames,
 )
 from reachmap.scans.ik_survey import Survey, SurveyContext, survey_in_stages
-from reachmap.scans.rolls import RollGroups
+from reachmap.scans.rolls import AT_ONCE, RollGroups
 from reachmap.scans.routes import Routes
 from reachmap.scans.workspace_roadmap import (
     component_of_frames,
@@ -62,18 +62,18 @@ def connected_grasps(scene: Scene, stages: Stages) -> BinRoadmap:
     tool = scene.loaded.cell.tool
     survey = _survey(scene, stages, "survey", grasp_grid(scene))
     if tool.roll == LISTED:
-        return _connected(scene, stages, "connect", survey)
-    rolls = _MoreRolls(scene, stages)
+        return connected_goals(scene, stages, "connect", survey)
+    rolls = MoreRolls(scene, stages)
     survey = rolls.groups.share_goals(survey)
     if scene.kinematics.any_roll:
         ends = survey.way[survey.way_begin + survey.way_size - 1]
         T_goal = scene.kinematics.forward_many(ends)
         axis = scene.loaded.cell.robot.tcp.approach_axis
         measured = rolls.groups.measured(survey, axis, T_goal)
-        return _connected(scene, stages, "connect", measured)
+        return connected_goals(scene, stages, "connect", measured)
     without = np.setdiff1d(rolls.groups.group, survey.frame)
     survey = rolls.add(survey, without, until_found=True)
-    known = _connected(scene, stages, "connect", survey)
+    known = connected_goals(scene, stages, "connect", survey)
     missed = np.setdiff1d(
         survey.frame, survey.frame[np.isfinite(known.routes.length_rad)]
     )
@@ -81,36 +81,14 @@ def connected_grasps(scene: Scene, stages: Stages) -> BinRoadmap:
     more = rolls.add(survey, missed, until_found=False)
     if len(more.frame) == len(survey.frame):
         return known
-    return _connected(scene, stages, "connect_again", more)
+    return connected_goals(scene, stages, "connect_again", more)
 
 
-def with_more_rolls(
-    scene: Scene, known: BinRoadmap, wanted: IntArray, stages: Stages
-) -> BinRoadmap:
-    """The same with all rolls of some groups of test grasps among the goals.
-
-    Parameters
-    ----------
-    scene : Scene
-        Of a cell whose roll is free.
-    known : BinRoadmap
-    wanted : int array
-        Groups, as ``known.survey.frame`` counts them.
-    stages : Stages
-    """
-    if scene.kinematics.any_roll:
-        return known  # the arm has no other
-    rolls = _MoreRolls(scene, stages, "_cycle")
-    more = rolls.add(known.survey, wanted, until_found=False)
-    if len(more.frame) == len(known.survey.frame):
-        return known
-    return _connected(scene, stages, "connect_cycle", more)
-
-
-class _MoreRolls:
+class MoreRolls:
     """Solves for rolls that are not listed, in stages of their own."""
 
     def __init__(self, scene: Scene, stages: Stages, suffix: str = "") -> None:
+        """Of a cell whose roll is free; the suffix tells its stages from others'."""
         cell = scene.loaded.cell
         self._scene, self._stages, self._suffix = scene, stages, suffix
         self._axis = cell.robot.tcp.approach_axis
@@ -122,6 +100,16 @@ class _MoreRolls:
         return self.groups.add_rolls(
             survey, wanted, self._axis, self._solve, until_found=until_found
         )
+
+    def few_at_a_time(self) -> list[FloatArray]:
+        """Rolls to be tried in turn, each far from those before it [rad]."""
+        turns = self.groups.turns
+        return [turns[k : k + AT_ONCE] for k in range(0, len(turns), AT_ONCE)]
+
+    def add_turns(self, survey: Survey, wanted: IntArray, turns: FloatArray) -> Survey:
+        """Add the goals of some rolls to some groups."""
+        few = dataclasses.replace(self.groups, turns=turns)
+        return few.add_rolls(survey, wanted, self._axis, self._solve, until_found=False)
 
     def _solve(self, T: FloatArray) -> Survey:
         self._number += 1
@@ -141,7 +129,10 @@ def _survey(
     return survey_in_stages(context, stages, phase)
 
 
-def _connected(scene: Scene, stages: Stages, phase: str, survey: Survey) -> BinRoadmap:
+def connected_goals(
+    scene: Scene, stages: Stages, phase: str, survey: Survey
+) -> BinRoadmap:
+    """Connect the goals of a survey, in a stage of its own."""
     payload = stages.once(phase, partial(_connection, scene, survey))
     return _roadmap_from_payload(survey, payload)
 

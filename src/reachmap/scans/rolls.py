@@ -19,8 +19,8 @@ from reachmap.scans.ik_survey import MAX_COUNT, Survey
 
 # Rounding of rolls that are meant to be equal.
 _SAME_ROLL_RAD = 1e-6
-# Rolls that are solved at once for directions that have no goal yet.
-_AT_ONCE = 4
+AT_ONCE = 4
+"""Rolls that are solved at once for directions that have nothing yet."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -136,7 +136,7 @@ class RollGroups:
         until_found : bool
             Leave a group alone as soon as it has a goal.
         """
-        step = _AT_ONCE if until_found else len(self.turns)
+        step = AT_ONCE if until_found else len(self.turns)
         for begin in range(0, len(self.turns), step):
             if not len(wanted):
                 break

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -28,6 +29,7 @@ from reachmap.runtime.run import run_scan
 from reachmap.sampling.frames import approach_distance_m
 from reachmap.scans.bin_roadmap import grasp_grid, roadmap_of
 from reachmap.scans.bin_scan import bin_work, pairs_of_fillings, plan_grasps
+from reachmap.scans.cycle.cell_warnings import drop_off_warnings
 from reachmap.scans.cycle.part_fit import require_room_for_part
 from reachmap.scans.cycle.scenes import CycleScenes, stages_of
 from reachmap.scans.document import checking_settings, scan_document
@@ -44,6 +46,8 @@ if TYPE_CHECKING:
     from reachmap.cell.loading import LoadedCell
 
 SAMPLE_GRASPS = 20
+
+logger = logging.getLogger(__name__)
 
 
 def bin_scan(
@@ -118,6 +122,8 @@ def bin_scan_work(loaded: LoadedCell, source_sha256: str = "") -> Work:
     if scenes is not None:
         scenes.home()
         require_room_for_part(scenes)
+        for warning in drop_off_warnings(scenes):
+            logger.warning(warning)
     document = scan_document(
         scene,
         body_pairs=pairs_of_fillings(loaded),

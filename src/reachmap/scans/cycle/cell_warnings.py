@@ -23,6 +23,12 @@ def cycle_warnings(loaded: LoadedCell) -> list[str]:
         require_room_for_part(scenes)
     except SceneError as error:
         return list(error.lines)
+    return drop_off_warnings(scenes)
+
+
+def drop_off_warnings(scenes: CycleScenes) -> list[str]:
+    """Sentences about drop-offs at which nothing can be put down."""
+    loaded = scenes.empty.loaded
     warnings = []
     for spec in loaded.cell.drop_offs:
         ways, pair = ways_to_place(scenes, spec)

@@ -18,7 +18,7 @@ from reachmap.scans.cycle.ways import Ways
 
 if TYPE_CHECKING:
     from reachmap.cell.loading import LoadedCell
-    from reachmap.scans.bin_roadmap import BinRoadmap
+    from reachmap.scans.ik_survey import Survey
 
 # Large enough to be solved in batches, small enough that workers end together.
 LIFTS_PER_UNIT = 200
@@ -51,6 +51,16 @@ class LiftSurvey:
     def __post_init__(self) -> None:
         freeze(self)
 
+    def joined_with(self, others: LiftSurvey, place: IntArray) -> LiftSurvey:
+        """The same with other lifts, which take the places (m,) among the goals."""
+        status, pair = self.status.copy(), self.blocking_pair.copy()
+        status[place], pair[place] = others.status, others.blocking_pair
+        ways = [self.ways[k] for k in range(len(self.ways))]
+        for k, at in enumerate(place.tolist()):
+            ways[at] = others.ways[k]
+        dof = self.ways.point.shape[1]
+        return LiftSurvey(status=status, blocking_pair=pair, ways=Ways.of(ways, dof))
+
     def verdict(self, goals: IntArray) -> tuple[int, int]:
         """Status of a grasp none of whose goals has a lift, and the pair to blame."""
         status = self.status[goals]
@@ -74,17 +84,13 @@ class LiftContext:
 
 def lift_in_stages(
     loaded: LoadedCell,
-    known: BinRoadmap,
+    survey: Survey,
+    rows: IntArray,
     body_pairs: tuple[str, ...],
     stages: Stages,
     phase: str,
 ) -> LiftSurvey:
-    """Lift the part from every goal of the grasps that are reached."""
-    survey = known.survey
-    connected = np.isin(
-        survey.frame, survey.frame[np.isfinite(known.routes.length_rad)]
-    )
-    rows = np.flatnonzero(connected)
+    """Lift the part from some goals of a survey."""
     ends = survey.way[survey.way_begin + survey.way_size - 1]
     context = LiftContext(loaded=loaded, body_pairs=body_pairs, Q=ends[rows])
     payloads = stages.run(

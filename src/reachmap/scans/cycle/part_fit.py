@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from reachmap._typing import BoolArray, FloatArray
@@ -13,6 +15,7 @@ from reachmap.errors import SceneError
 from reachmap.geometry import inverse_transform, transform_from_parts
 from reachmap.sampling.frames import bin_test_frames
 from reachmap.scans.cycle.scenes import CycleScenes
+from reachmap.scans.rolls import RollGroups
 
 
 def require_room_for_part(scenes: CycleScenes) -> None:
@@ -25,29 +28,46 @@ def require_room_for_part(scenes: CycleScenes) -> None:
     SceneError
         A sentence that says where the part is and what may be changed.
     """
-    loaded = scenes.empty.loaded
-    cell, T_base_bin = loaded.cell, scenes.empty.T_base_bin
+    cell, source = scenes.empty.loaded.cell, scenes.empty.loaded.source
+    least_m, wall, grasps = -np.inf, "", 0
+    for T_bin_tcp in _turned_grasps(scenes):
+        heights = T_bin_tcp[:, 2, :3] @ scenes.part.points.T + T_bin_tcp[:, 2, 3:]
+        lowest_m = heights.min(axis=1)
+        above = lowest_m >= -cell.lift.contact_allowance_m
+        least_m = max(least_m, float(lowest_m.max()))
+        grasps = max(grasps, len(T_bin_tcp))
+        if above.any():
+            wall = _wall_around(scenes, T_bin_tcp, above)
+            if not wall:
+                return
+    many = f"all {grasps} test grasps"
     if cell.tool.roll != LISTED:
-        return  # other rolls than those of the test grasps will do, too
-    frames = bin_test_frames(cell, T_base_bin).T_base_tcp.reshape(-1, 4, 4)
-    T_bin_tcp = inverse_transform(T_base_bin) @ frames
-    height = T_bin_tcp[:, 2, :3] @ scenes.part.points.T + T_bin_tcp[:, 2, 3:]
-    lowest_m = height.min(axis=1)
-    above = lowest_m >= -cell.lift.contact_allowance_m
-    many, source = f"all {len(frames)} test grasps", loaded.source
-    if not above.any():
+        many += ", however the tool is turned"
+    if not wall:
         raise SceneError(
-            f"{source}: part: it starts {-1e3 * lowest_m.max():.3g} mm or more inside "
+            f"{source}: part: it starts {-1e3 * least_m:.3g} mm or more inside "
             f"the bin bottom at {many} (lift.contact_allowance_m: "
             f"{1e3 * cell.lift.contact_allowance_m:g} mm); raise bin_scan.layers, or "
             "change part.shape or part.pose"
         )
-    wall = _wall_around(scenes, T_bin_tcp, above)
-    if wall:
-        raise SceneError(
-            f"{source}: part: it starts inside a wall at {many} ({wall}, for one); "
-            "change part.shape or part.pose"
-        )
+    raise SceneError(
+        f"{source}: part: it starts inside a wall at {many} ({wall}, for one); "
+        "change part.shape or part.pose"
+    )
+
+
+def _turned_grasps(scenes: CycleScenes) -> Iterator[FloatArray]:
+    """Poses (n, 4, 4) of the tool in the bin at all test grasps, turn by turn."""
+    cell, T_base_bin = scenes.empty.loaded.cell, scenes.empty.T_base_bin
+    grid, axis = bin_test_frames(cell, T_base_bin), cell.robot.tcp.approach_axis
+    T_bin_base = inverse_transform(T_base_bin)
+    yield T_bin_base @ grid.T_base_tcp.reshape(-1, 4, 4)
+    if cell.tool.roll == LISTED or scenes.part.is_round:
+        return  # no other turn will do, or all are alike
+    groups = RollGroups.of(grid.frames, axis, cell.tool)
+    every = np.arange(len(groups.T))
+    for turn in groups.turns:
+        yield T_bin_base @ groups.turned(every, np.array([turn]), axis)
 
 
 def _wall_around(scenes: CycleScenes, T_bin_tcp: FloatArray, wanted: BoolArray) -> str:
