@@ -75,7 +75,7 @@ def main() -> None:
     loaded = cell_of_artefact(record.provenance, sys.argv[1])
     cell = loaded.cell
     rings = cell.bin_scan.orientations.rings()
-    rolls = max(ring.rolls for ring in rings)
+    rolls = max(cell.tool.count(), *(ring.rolls for ring in rings))
     ranker, gaps = Ranker(record), []
     for number in range(heaps):
         heap = drop_heap(cell.bin, (x, y, z), FILL, SEED + number)

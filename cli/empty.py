@@ -10,21 +10,23 @@ import click
 from reachmap.cli.answers import say
 from reachmap.cli.options import (
     INPUT_FILE,
+    OUTPUT_PATH,
     json_option,
     output_option,
     overwrite_option,
     seed_option,
 )
-from reachmap.cli.quantities import BOX
+from reachmap.cli.quantities import PART
 
 
 @click.command()
 @click.argument("bin_map", metavar="BIN_MAP", type=INPUT_FILE)
 @click.option(
     "--part",
-    type=BOX,
-    metavar="LxWxH",
-    help="Sides of a box around the part, 60x40x20mm; default: the part of the cell.",
+    type=PART,
+    metavar="PART",
+    help="A box, 60x40x20mm, a cylinder, d30x80mm, or a mesh file in metres, of which "
+    "the box around them counts; default: the part of the cell.",
 )
 @click.option(
     "--fill",
@@ -50,16 +52,23 @@ from reachmap.cli.quantities import BOX
     help="Of what lies free: the highest part first, or the one that costs least.",
 )
 @output_option(help="Also write every part with its place and fate (JSON).")
+@click.option(
+    "--picture",
+    type=OUTPUT_PATH,
+    metavar="PATH",
+    help="Draw what stays there, too (.png or .svg).",
+)
 @seed_option
 @overwrite_option
 @json_option
 def command(
     bin_map: Path,
-    part: tuple[float, float, float] | None,
+    part: tuple[float, float, float] | Path | None,
     fill: float,
     heaps: int,
     order: Literal["highest", "rank"],
     output: Path | None,
+    picture: Path | None,
     seed: int | None,
     overwrite: bool,
     as_json: bool,
@@ -67,8 +76,8 @@ def command(
     """Fill a bin with parts and pick them to the end.
 
     Parts fall at random places of the bin and come to rest on what lies there. Each is
-    grasped at the middle of its top, along its normal, if BIN_MAP reaches the test
-    grasp nearest to that, and once no other part covers it. Nothing is planned.
+    grasped at the middle of its top, along its normal, once no other part covers it, if
+    BIN_MAP reaches more than half of the test grasps around that. Nothing is planned.
 
     Example: reachmap empty bin.h5 --part 60x40x20mm
     """
@@ -83,9 +92,10 @@ def command(
         order=order,
         seed=seed,
         output=output,
+        picture=picture,
         overwrite=overwrite,
     )
-    written = [] if output is None else [str(output)]
+    written = [str(path) for path in (output, picture) if path is not None]
     say(
         answer.facts(),
         lambda: "\n".join([*emptying_lines(answer), *written]),

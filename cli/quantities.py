@@ -1,8 +1,9 @@
-"""Lengths and angles with their units on the command line: ``5mm``, ``1deg``, boxes."""
+"""Lengths and angles with their units on the command line: ``5mm``, ``1deg``, parts."""
 
 from __future__ import annotations
 
 import re
+from pathlib import Path
 from typing import Any
 
 import click
@@ -14,6 +15,7 @@ NUMBER = r"(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:e[-+]?[0-9]+)?"
 BOX_SIDES = re.compile(
     rf"({NUMBER})\s*x\s*({NUMBER})\s*x\s*({NUMBER})\s*(mm|cm|m)", re.IGNORECASE
 )
+ROUND = re.compile(rf"d({NUMBER})\s*x\s*({NUMBER})\s*(mm|cm|m)", re.IGNORECASE)
 QUANTITY = re.compile(rf"({NUMBER})(mm|cm|m|deg|°|rad)", re.IGNORECASE)
 
 
@@ -48,26 +50,36 @@ class ErrorSizeType(click.ParamType):  # type: ignore[type-arg, unused-ignore]
 ERROR_SIZE = ErrorSizeType()
 
 
-class BoxType(click.ParamType):  # type: ignore[type-arg, unused-ignore]
-    """Three sides with one unit: ``60x40x20mm``, in metres."""
+class PartType(click.ParamType):  # type: ignore[type-arg, unused-ignore]
+    """A box ``60x40x20mm``, a cylinder ``d30x80mm`` or a mesh file.
 
-    name = "box"
+    Boxes, of a cylinder that around it, are read as three sides in metres.
+    """
+
+    name = "part"
 
     def convert(
         self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> tuple[float, float, float]:
+    ) -> tuple[float, float, float] | Path:
         """Read one; click reports what is none."""
-        if isinstance(value, tuple):
+        if isinstance(value, tuple | Path):
             return value
-        found = BOX_SIDES.fullmatch(str(value).strip())
-        if found is None:
-            self.fail(f"{value!r}: expected three sides and a unit, 60x40x20mm.")
-        factor = LENGTHS_M[found[4].lower()]
-        x, y, z = (factor * float(found[k]) for k in (1, 2, 3))
-        return x, y, z
+        text = str(value).strip()
+        if box := BOX_SIDES.fullmatch(text):
+            x, y, z = (LENGTHS_M[box[4].lower()] * float(box[k]) for k in (1, 2, 3))
+            return x, y, z
+        if bar := ROUND.fullmatch(text):
+            d, length = (LENGTHS_M[bar[3].lower()] * float(bar[k]) for k in (1, 2))
+            return d, d, length
+        if not Path(text).suffix[1:2].isalpha():
+            self.fail(
+                f"{value!r}: expected three sides and a unit, 60x40x20mm, a cylinder, "
+                "d30x80mm, or a mesh file."
+            )
+        return Path(text)
 
 
-BOX = BoxType()
+PART = PartType()
 
 
 class QuantityCommand(click.Command):

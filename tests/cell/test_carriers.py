@@ -18,6 +18,7 @@ TOY = Path(__file__).parents[2] / "cells" / "planar-toy.yaml"
 PUBLISHED = {
     "KLT-3147": ((297, 198, 147.5), (243, 162, None)),
     "KLT-4147": ((396, 297, 147.5), (346, 265, None)),
+    "KLT-4322": ((396, 297, 213), (346, 265, 175)),
     "KLT-4280": ((396, 297, 280), (346, 265, None)),
     "KLT-4329": ((396, 297, 280), (346, 265, None)),
     "KLT-6147": ((594, 396, 147.5), (544, 364, None)),
@@ -74,7 +75,7 @@ def test_a_carrier_stands_for_its_dimensions(name: str) -> None:
     """The resolved cell has them written out, and is the same cell without the name."""
     named = load(f"  carrier: {name}\n  pose: {{xyz: [1, 0, 0]}}\n")
     plain = load(
-        "  inner: [0.544, 0.364, 0.265]\n  wall: [0.025, 0.016]\n  bottom: 0.015\n"
+        "  inner: [0.544, 0.364, 0.262]\n  wall: [0.025, 0.016]\n  bottom: 0.018\n"
         "  pose: {xyz: [1, 0, 0]}\n"
     )
     assert named.cell.bin.carrier == "KLT-6428"
@@ -88,7 +89,7 @@ def test_what_the_cell_says_itself_wins() -> None:
     """And of two overrides, what the more particular one says."""
     assert load("  carrier: KLT-6428\n  bottom: 0.02\n").cell.bin.bottom == 0.02
     changed = read_cell("planar-toy", ["bin.carrier=KLT-4147", "bin.bottom=0.02"])
-    assert changed.cell.bin.inner == (0.346, 0.265, 0.1325)
+    assert changed.cell.bin.inner == (0.346, 0.265, 0.1295)
     assert changed.cell.bin.bottom == 0.02
 
 
@@ -103,6 +104,19 @@ def test_an_override_changes_the_carrier_of_a_stored_cell() -> None:
     )
     assert other.cell.bin.inner == (0.37, 0.27, 0.215)
     assert other.cell.bin.walls == (0.015, 0.015)
+
+
+@pytest.mark.parametrize("change", ["bin.carrier=5", "bin.carrier=[KLT-6428]"])
+def test_a_carrier_that_is_no_name_is_one_mistake(change: str) -> None:
+    """That the bin has no size then is not told as well."""
+    with pytest.raises(CellError, match=r"bin\.carrier: expected text") as caught:
+        cell_from_text(
+            toy("  carrier: KLT-6428\n"),
+            label="toy.yaml",
+            directory=TOY.parent,
+            overrides=[change],
+        )
+    assert len(caught.value.lines) == 1
 
 
 def test_unknown_names_are_told_with_the_nearest() -> None:
@@ -140,4 +154,4 @@ def test_carriers_are_listed() -> None:
     assert [row["name"] for row in rows["carriers"]] == [c.name for c in carriers()]
     assert all(row["source"] for row in rows["carriers"])
     assert len(text.stdout.splitlines()) == len(carriers()) + 1
-    assert "544 x 364 x 265" in text.stdout
+    assert "544 x 364 x 262" in text.stdout

@@ -124,7 +124,7 @@ def test_carriers_and_supports_are_of_each(tmp_path):
         bottom = cell.T_base_of(spec)[2, 3] - spec.bottom_m
         T_base_world = cell.T_base_world()
         assert bottom == pytest.approx(-0.35 + T_base_world[2, 3]), name
-    assert cell.bins["b"].inner == (0.346, 0.265, 0.1325)
+    assert cell.bins["b"].inner == (0.346, 0.265, 0.1295)
 
 
 @pytest.mark.parametrize(

@@ -39,11 +39,14 @@ class Heap:
         Unit, out of the top.
     above : tuple of int arrays
         Parts that cover each.
+    outline : array, shape (n, 4, 2)
+        Corners of each seen from above [m].
     """
 
     position: FloatArray
     normal: FloatArray
     above: tuple[IntArray, ...]
+    outline: FloatArray
 
     def __len__(self) -> int:
         return len(self.position)
@@ -71,25 +74,25 @@ def drop_heap(
     surface = _Surface(spec, min(part))
     rng = np.random.default_rng(seed)
     level = fill * spec.inner[2]
-    tops: list[FloatArray] = []
-    normals: list[FloatArray] = []
+    laid: list[_Rest] = []
     above: list[list[int]] = []
     missed = 0
     while missed < TRIES and surface.mean_m < level:
-        laid = surface.lay(len(tops), _resting(part, rng), rng)
-        if laid is None:
+        found = surface.lay(len(laid), _resting(part, rng), rng)
+        if found is None:
             missed += 1
             continue
         missed = 0
-        for below in laid.covered:
-            above[below].append(len(tops))
-        tops.append(laid.position)
-        normals.append(laid.normal)
+        rest, covered = found
+        for below in covered:
+            above[below].append(len(laid))
+        laid.append(rest)
         above.append([])
     return Heap(
-        position=np.array(tops).reshape(-1, 3),
-        normal=np.array(normals).reshape(-1, 3),
+        position=np.array([rest.position for rest in laid]).reshape(-1, 3),
+        normal=np.array([rest.normal for rest in laid]).reshape(-1, 3),
         above=tuple(np.array(parts, np.int64) for parts in above),
+        outline=np.array([rest.outline() for rest in laid]).reshape(-1, 4, 2),
     )
 
 
@@ -105,13 +108,6 @@ def _resting(
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Laid:
-    position: FloatArray
-    normal: FloatArray
-    covered: list[int]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Rest:
     """How a part may come to rest: where, and the cells of the map under it."""
 
@@ -121,6 +117,12 @@ class _Rest:
     top: FloatArray
     along: FloatArray
     half: FloatArray
+
+    def outline(self) -> FloatArray:
+        """Corners seen from above, shape (4, 2) [m]."""
+        axes = np.array([self.along, (-self.along[1], self.along[0])])
+        unit = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
+        return np.asarray(self.position[:2] + unit * self.half @ axes)
 
     def hides(self, point: FloatArray) -> bool:
         """Whether a point lies below the part."""
@@ -160,8 +162,11 @@ class _Surface:
         number: int,
         sides: tuple[float, float, float],
         rng: np.random.Generator,
-    ) -> _Laid | None:
-        """Drop a part, which rolls to the lowest of some places; None: no room."""
+    ) -> tuple[_Rest, list[int]] | None:
+        """Drop a part, which rolls to the lowest of some places; None: no room.
+
+        With the parts on top until now that it covers.
+        """
         found = [self._rest(sides, rng) for _ in range(PLACES)]
         best = min((r for r in found if r is not None), key=_height_of, default=None)
         if best is None:
@@ -170,7 +175,7 @@ class _Surface:
         self._height[best.under] = best.top
         self._owner[best.under] = number
         self._rest_of[number] = best
-        return _Laid(position=best.position, normal=best.normal, covered=covered)
+        return best, covered
 
     def _rest(
         self, sides: tuple[float, float, float], rng: np.random.Generator

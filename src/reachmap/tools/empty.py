@@ -13,13 +13,16 @@ import numpy as np
 
 from reachmap._typing import BoolArray, FloatArray
 from reachmap.cell.loading import stored_cell
+from reachmap.cell.meshes.reading import MeshError, read_mesh
 from reachmap.cell.model.cell import Cell
 from reachmap.cell.model.shapes import sides
 from reachmap.errors import SettingsError
 from reachmap.maps import BinMap, check_outputs, publish, read_bin_map
+from reachmap.maps.bytes.publish import check_picture
 from reachmap.picking.emptying import Emptied, Fate, Order, empty_heap
 from reachmap.picking.heap import Heap, drop_heap
 from reachmap.picking.summary import HeapSummary, summarise_heap
+from reachmap.ranking.lookup.calibration import usual_calibration
 from reachmap.ranking.lookup.order import OUTSIDE_MAP, UNLIKE_MAP
 from reachmap.ranking.lookup.ranker import Ranker
 
@@ -27,6 +30,7 @@ logger = logging.getLogger(__name__)
 
 FILL, HEAPS, MAX_HEAPS = 0.9, 3, 1000
 MAX_PARTS = 20_000
+LIKELY = 0.5
 ORDERS = ("highest", "rank")
 
 
@@ -122,12 +126,13 @@ def _parts(one: SimulatedHeap) -> list[dict[str, Any]]:
 def empty(
     map_path: Path,
     *,
-    part: tuple[float, float, float] | None = None,
+    part: tuple[float, float, float] | Path | None = None,
     fill: float = FILL,
     heaps: int = HEAPS,
     order: Order = "highest",
     seed: int | None = None,
     output: Path | None = None,
+    picture: Path | None = None,
     overwrite: bool = False,
 ) -> EmptyAnswer:
     """Fill a bin with parts at random and pick them to the end, with the map alone.
@@ -136,8 +141,9 @@ def empty(
     ----------
     map_path : Path
         A bin map.
-    part : (float, float, float), optional
-        Sides of a box around the part [m]; default: of the part that the cell names.
+    part : (float, float, float) or Path, optional
+        Sides of a box around the part [m], or its mesh in metres; default: the part
+        that the cell names.
     fill : float
         Share of the depth that parts reach up to, on average.
     heaps : int
@@ -148,6 +154,8 @@ def empty(
         Of the first heap; default: the map's.
     output : Path, optional
         A JSON file with every part.
+    picture : Path, optional
+        Draw what stays there (.png or .svg).
     overwrite : bool
 
     Raises
@@ -162,28 +170,33 @@ def empty(
         raise SettingsError(f"--fill must be above 0 and at most 1 (got {fill:g})")
     if not 1 <= heaps <= MAX_HEAPS:
         raise SettingsError(f"--heaps must be 1 to {MAX_HEAPS} (got {heaps})")
-    check_outputs([output], overwrite=overwrite, inputs=[map_path])
+    check_picture(picture, "--picture")
+    inputs = [map_path, part] if isinstance(part, Path) else [map_path]
+    check_outputs([output, picture], overwrite=overwrite, inputs=inputs)
     bin_map = read_bin_map(map_path)
     cell = stored_cell(bin_map.provenance.cell_resolved_json, source=str(map_path)).cell
-    part = _part_of(cell, map_path) if part is None else part
-    _check_part(cell, part, fill)
-    _warn(cell, bin_map, map_path)
+    box = _box_around(part, cell, map_path)
+    _check_part(cell, box, fill)
     first = bin_map.stamp.seed if seed is None else seed
-    ranker = Ranker(bin_map)
+    ranker = Ranker(bin_map, calibration=usual_calibration(map_path, bin_map.stamp))
     found = tuple(
-        _simulated(ranker, bin_map, cell, part, fill, order, first + k)
+        _simulated(ranker, bin_map, cell, box, fill, order, first + k)
         for k in range(heaps)
     )
     if not any(len(one.heap) for one in found):
+        unit = " (meshes are in metres)" if isinstance(part, Path) else ""
         raise SettingsError(
-            f"--part: not a single one fits at a fill of {fill:g} (the bin is "
-            f"{_mm(cell.bin.inner)} mm inside)"
+            f"--part: not a single one of {_mm(box)} mm{unit} fits at a fill of "
+            f"{fill:g}; the bin is {_mm(cell.bin.inner)} mm inside"
         )
-    answer = EmptyAnswer(part=part, fill=fill, order=order, heaps=found)
+    _warn(cell, bin_map, map_path)
+    answer = EmptyAnswer(part=box, fill=fill, order=order, heaps=found)
     if output is not None:
         facts = {"map": bin_map.stamp.content_sha256} | answer.facts(with_parts=True)
         text = json.dumps(facts, indent=1, allow_nan=False)
         publish(output, [text.encode("ascii"), b"\n"], overwrite=overwrite)
+    if picture is not None:
+        _draw(picture, bin_map, answer, overwrite=overwrite)
     return answer
 
 
@@ -192,13 +205,19 @@ def part_costs(
 ) -> tuple[FloatArray, BoolArray]:
     """Cost of each part of a heap, (n,), and whether the map says nothing of it.
 
-    Parts are grasped at the middle of their top, along its normal, at any roll.
+    Parts are grasped at the middle of their top, along its normal, at any roll. Those
+    count as reached of which that is more likely than not: between test points, heights
+    and directions the nearest test grasp alone is wrong more than twice as often. One
+    whose own test grasp is not reached costs as much as the dearest.
     """
     T = bin_map.bin_pose
     ranking = ranker.rank(
         heap.position @ T[:3, :3].T + T[:3, 3], -heap.normal @ T[:3, :3].T
     )
-    return ranking.cost, np.isin(ranking.status, [OUTSIDE_MAP, UNLIKE_MAP])
+    dearest = float(ranking.cost[ranking.reachable].max(initial=0.0))
+    cost = np.where(ranking.reachable, ranking.cost, dearest)
+    cost[~(ranking.probability >= LIKELY)] = np.inf
+    return cost, np.isin(ranking.status, [OUTSIDE_MAP, UNLIKE_MAP])
 
 
 def _simulated(
@@ -221,8 +240,29 @@ def _simulated(
     )
 
 
-def _part_of(cell: Cell, map_path: Path) -> tuple[float, float, float]:
-    """Box around the part that the cell names."""
+def _draw(path: Path, bin_map: BinMap, answer: EmptyAnswer, *, overwrite: bool) -> None:
+    from reachmap.plots.cell.emptied import draw_emptied
+    from reachmap.plots.parts.files import write_picture
+
+    title = f"{answer.left_percent:.1f} % of parts of {_mm(answer.part)} mm stay"
+    heaps = [(one.heap, one.emptied) for one in answer.heaps]
+    write_picture(
+        path,
+        draw_emptied(bin_map, heaps, title),
+        title="What stays in the bin",
+        config_sha256=bin_map.stamp.config_sha256,
+        overwrite=overwrite,
+    )
+
+
+def _box_around(
+    part: tuple[float, float, float] | Path | None, cell: Cell, map_path: Path
+) -> tuple[float, float, float]:
+    """Sides of the box around a part, of the cell's where none is given [m]."""
+    if isinstance(part, tuple):
+        return part
+    if part is not None:
+        return _box_of_mesh(part)
     named = cell.held()
     if named is None:
         raise SettingsError(
@@ -231,9 +271,21 @@ def _part_of(cell: Cell, map_path: Path) -> tuple[float, float, float]:
     name, spec = named
     if spec.shape.mesh is not None:
         raise SettingsError(
-            f"{map_path}: {name} is a mesh; give the box around it, --part 60x40x20mm"
+            f"{map_path}: {name} is a mesh; give its file or the box around it, --part "
+            "60x40x20mm"
         )
     x, y, z = sides(spec.shape).tolist()
+    return x, y, z
+
+
+def _box_of_mesh(path: Path) -> tuple[float, float, float]:
+    try:
+        mesh = read_mesh(path.read_bytes(), path.suffix)
+    except OSError as error:
+        raise SettingsError(f"--part {path}: {error.strerror}") from None
+    except MeshError as error:
+        raise SettingsError(f"--part {path}: {error}") from None
+    x, y, z = sides(mesh).tolist()
     return x, y, z
 
 

@@ -110,6 +110,8 @@ def write_out_carriers(document: Document) -> None:
     for _, place in bin_places(document.data):
         if text_at(document.data, *place, "carrier") is not None:
             _write_out_carrier(document, place)
+        elif at(document.data, *place, "carrier") is not None:
+            _stand_in(at(document.data, *place))
 
 
 def _write_out_carrier(document: Document, place: Location) -> None:
@@ -124,8 +126,7 @@ def _write_out_carrier(document: Document, place: Location) -> None:
         document.add(
             location, f"no carrier {name!r}; {hint} (`reachmap carriers` lists them)"
         )
-        # What is missing because there is no carrier is not a mistake of its own.
-        tray.setdefault("inner", [1.0, 1.0, 1.0])
+        _stand_in(tray)
         return
     tray["carrier"] = carrier.name
     keys = carrier.keys()
@@ -135,3 +136,9 @@ def _write_out_carrier(document: Document, place: Location) -> None:
         is_newer = own in document.places and is_override(document.place(own))
         if tray.get(key) is None or (overridden and not is_newer):
             tray[key] = keys.get(key)
+
+
+def _stand_in(tray: dict[str, Any]) -> None:
+    """Give a bin without a known carrier some size: that it has none is no mistake."""
+    if tray.get("inner") is None:
+        tray["inner"] = [1.0, 1.0, 1.0]

@@ -25,7 +25,9 @@ def write_out_fill(document: Document) -> None:
         return
     key, spec = given[0], at(document.data, SECTION)
     values, depth = _numbers(spec[key]), _depth(document)
-    if values is None or depth is None:
+    if values is None or depth is None or min(values) < 0:
+        return
+    if key == "fill" and max(values) > 1:
         return
     if values != sorted(set(values)):
         document.add((SECTION, key), f"levels must rise strictly (got {values})")

@@ -1,0 +1,142 @@
+"""Worst cases of the placed bin, of the paper's rule and of random poses in hard cells.
+
+``place-bin`` looks at four corners of its tolerance with a coarse sample; here the
+worst of fifteen poses counts: the pose itself, all eight corners in x, y and yaw, and
+the middle of each side, in height too where nothing supports the bin. All poses are
+asked in the same way, with more points than ``place-bin`` takes for neighbours and
+every orientation. Random poses are feasible as the search means it: clear of all, on a
+support where the cell has one, within the camera's sight. One that scores less than
+the chosen pose's worst case has lost, as has one with such a neighbour; its figure then
+is an upper bound.
+
+    python benchmarks/bench_worst_case.py CELL.yaml... [--random N] [--set KEY=VALUE]
+"""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import tempfile
+from collections.abc import Iterator, Sequence
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+
+from reachmap.cell.loading import read_cell
+from reachmap.errors import ReachmapError
+from reachmap.maps import read_workspace_map
+from reachmap.maps.provenance import cell_of_artefact
+from reachmap.placement.decision import paper_pose
+from reachmap.placement.mapped.evaluator import open_evaluator
+from reachmap.placement.mapped.exact import Pose
+from reachmap.placement.mapped.sample import Grid
+from reachmap.placement.problem import Question
+from reachmap.placement.tolerance import moved_by
+from reachmap.runtime.options import RunOptions
+from reachmap.runtime.progress import Progress
+from reachmap.tools.place_bin import PlacementChoice, placed_bin
+from reachmap.tools.workspace_scan import workspace_scan
+
+QUIET = RunOptions(workers=1, quiet=True)
+GRID: Grid = (6, 5, 1)
+SEED, TRIES = 1, 4000
+
+
+def neighbourhood(pose: Pose, question: Question) -> Iterator[Pose]:
+    """The pose and what its tolerance allows, corners first."""
+    yield pose
+    scale, floats = question.tolerance.scale, question.tolerance.floats
+    for x, y, yaw in product((1.0, -1.0), repeat=3):
+        yield moved_by(pose, scale * [x, y, 0.0, yaw])
+    for axis in (0, 1, 2, 3) if floats else (0, 1, 3):
+        for sign in (1.0, -1.0):
+            yield moved_by(pose, scale * (sign * np.eye(4)[axis]))
+
+
+def worst(pose: Pose, question: Question, enough_below: float = -1.0) -> float:
+    """Least score of a neighbourhood [percent]; 0 where the bin cannot stand.
+
+    Ends where a score is below a number.
+    """
+    found = 100.0
+    poses = list(neighbourhood(pose, question))
+    # Contact costs next to nothing, so it is asked everywhere first.
+    if any(question.fit.contact(question.T_base_bin(near)) for near in poses):
+        return 0.0
+    for near in poses:
+        (here,) = question.evaluator.evaluate([near], question.start, grid=GRID)
+        found = min(found, 0.0 if here.score is None else here.score.score)
+        if found <= enough_below:
+            break
+    return found
+
+
+def random_poses(question: Question, count: int) -> list[Pose]:
+    """Feasible poses, uniform over the region and over supports."""
+    rng, found = np.random.default_rng(SEED), []
+    region, bottom = question.region, question.loaded.cell.bin.bottom_m
+    for _ in range(TRIES):
+        x, y, z, yaw = rng.uniform(region.low, region.high).tolist()
+        if question.supports:
+            face = question.supports[rng.integers(len(question.supports))]
+            z = face.z + bottom
+        pose = (x, y, z, yaw)
+        if not question.reason_against(pose) and question.can_be_imaged(pose):
+            found.append(pose)
+        if len(found) == count:
+            break
+    return found
+
+
+def compare(cell: str, overrides: Sequence[str], count: int, folder: Path) -> None:
+    """Place the bin of one cell and print the worst cases."""
+    workspace = folder / "workspace.h5"
+    workspace_scan(cell, workspace, overrides=overrides, run=QUIET)
+    mapped = read_workspace_map(workspace)
+    loaded = cell_of_artefact(mapped.provenance, str(workspace), ())
+    placed = placed_bin(loaded, mapped, PlacementChoice(), QUIET)
+    placement, question = placed.placement, placed.question
+    x, y, z, yaw = placement.candidate_pose[placement.chosen].tolist()
+    chosen: Pose = (x, y, z, yaw)
+    progress = Progress("bench", quiet=True)
+    with open_evaluator(
+        loaded, question.is_open, QUIET, progress=progress
+    ) as evaluator:
+        question = dataclasses.replace(question, evaluator=evaluator)
+        own = worst(chosen, question)
+        paper = paper_pose(question)
+        of_paper = np.nan if paper is None else worst(paper, question, own - 1e-9)
+        poses = random_poses(question, count)
+        others = [worst(pose, question, own) for pose in poses]
+    name = read_cell(cell, overrides).cell.name
+    where = f"{x:+.3f} {y:+.3f} {z:+.3f} {np.degrees(yaw):.0f}°"
+    stands = placement.support or "floats"
+    better = [value for value in others if value > own]
+    print(
+        f"{name}: {where} on {stands}; worst case {own:.1f} %, told "
+        f"{placement.worst_score[placement.chosen]:.1f} %, paper's rule "
+        f"{of_paper:.1f} %, better random poses {len(better)} of {len(others)} "
+        f"(best {max(others, default=np.nan):.1f} %), supports "
+        f"{len(question.supports)}, {evaluator.cpu_s:.0f} s",
+        flush=True,
+    )
+
+
+def main() -> None:
+    """Print one line a cell."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("cells", nargs="+")
+    parser.add_argument("--random", type=int, default=20, metavar="N")
+    parser.add_argument("--set", dest="overrides", action="append", default=[])
+    options = parser.parse_args()
+    for cell in options.cells:
+        with tempfile.TemporaryDirectory() as name:
+            try:
+                compare(cell, options.overrides, options.random, Path(name))
+            except ReachmapError as error:
+                print(f"{cell}: {error}", flush=True)
+
+
+if __name__ == "__main__":
+    main()
