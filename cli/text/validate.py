@@ -170,12 +170,13 @@ def _cycle_lines(validation: Validation) -> list[str]:
         return []
     overall = validation.cycles[-1]
     c, r = overall.confusion, overall.correlation
-    rows = [["", "order", "whole", "cycle [s]"]]
+    rows = [["", "order", "whole", "cycle [s]", "per part [s]"]]
     for one in validation.cycles:
         label = printable(one.label, LABEL_WIDTH)
         for name, first in one.orders.items():
             share = f"{first.whole}/{first.considered}"
-            rows.append([label, name, share, _number(first.seconds, 2)])
+            seconds = (first.seconds, first.seconds_per_part)
+            rows.append([label, name, share, *(_number(s, 2) for s in seconds)])
             label = ""
     return [
         "",
@@ -191,8 +192,9 @@ def _cycle_lines(validation: Validation) -> list[str]:
                 ),
             ]
         ),
-        f"First {validation.top} of each order, mean measured cycle of those whole",
-        *table_lines(rows, "<<>>"),
+        f"First {validation.top} of each order: mean measured cycle of those whole; "
+        "per part with what failures cost",
+        *table_lines(rows, "<<>>>"),
     ]
 
 

@@ -76,6 +76,12 @@ def test_measured_seconds_are_at_least_those_of_the_map(toy: tuple[Any, Any]) ->
     quickest = np.sort(measured[np.isfinite(measured)])[: first.considered]
     assert first.seconds == pytest.approx(quickest.mean())
     assert first.whole == first.considered == 10
+    # As supplied, the two outermost grasps come first and fail: no part is there.
+    supplied = answer.validation.cycles[0].orders["supplied"]
+    lost = np.isnan(measured[:10])
+    assert supplied.whole == 10 - lost.sum() < 10
+    spent = np.nansum(measured[:10]) + lost.sum() * np.nanmedian(predicted)
+    assert supplied.seconds_per_part == pytest.approx(spent / supplied.whole)
 
 
 def test_cycles_stand_in_the_text_and_the_facts(toy: tuple[Any, Any]) -> None:

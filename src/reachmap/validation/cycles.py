@@ -40,6 +40,8 @@ class JudgedCycles:
         :class:`~reachmap.maps.parts.StageStatus` of the first attempt.
     measured_s : array, shape (n,)
         Mean cycle time of the attempts that did; NaN without any.
+    failure_s : float
+        What a grasp without a whole cycle costs [s].
     orders : mapping of str to int array
         Rows in the order in which they would be tried, by name in ``CYCLE_ORDERS``.
     """
@@ -49,6 +51,7 @@ class JudgedCycles:
     found: BoolArray
     status: CodeArray
     measured_s: FloatArray
+    failure_s: float
     orders: Mapping[str, IntArray]
 
     def __post_init__(self) -> None:
@@ -57,18 +60,22 @@ class JudgedCycles:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FirstSeconds:
-    """The first grasps of one order: how many have a whole cycle, and its mean time.
+    """The first grasps of one order: how many have a whole cycle, and what they take.
 
     Attributes
     ----------
     considered, whole : int
     seconds : float
-        Over those with a whole cycle [s]; NaN without any.
+        Mean of those with a whole cycle [s]; NaN without any.
+    seconds_per_part : float
+        All of them in turn, what failures cost included, for each whole cycle [s];
+        NaN without any.
     """
 
     considered: int
     whole: int
     seconds: float
+    seconds_per_part: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -133,6 +140,7 @@ def judge_cycles(
         outside=ranking.status == OUTSIDE_MAP,
         found=count > 0,
         measured_s=np.where(count > 0, total / np.maximum(count, 1), np.nan),
+        failure_s=ranker.failure_cost_s(asked),
         orders={
             "supplied": np.arange(len(count)),
             "re-ranked": ranked.ranking.order.copy(),
@@ -172,12 +180,17 @@ def _summary(label: str, lists: Sequence[JudgedCycles], top: int) -> CycleSummar
 
 def _first(lists: Sequence[JudgedCycles], order: str, top: int) -> FirstSeconds:
     """First grasps of each list in one order, all lists together."""
-    measured = np.concatenate(
-        [one.measured_s[one.orders[order][:top]] for one in lists]
-    )
+    firsts = [one.measured_s[one.orders[order][:top]] for one in lists]
+    measured = np.concatenate(firsts)
     known = measured[np.isfinite(measured)]
+    lost_s = sum(
+        one.failure_s * float(np.isnan(first).sum())
+        for one, first in zip(lists, firsts, strict=True)
+    )
+    total_s, nan = float(known.sum()), float("nan")
     return FirstSeconds(
         considered=len(measured),
         whole=len(known),
-        seconds=float(known.mean()) if len(known) else float("nan"),
+        seconds=total_s / len(known) if len(known) else nan,
+        seconds_per_part=(total_s + lost_s) / len(known) if len(known) else nan,
     )
