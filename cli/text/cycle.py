@@ -33,6 +33,7 @@ def cycle_lines(cycle: CycleSummary | None) -> list[str]:
             [
                 ("least to most", f"{cycle.least:.2f} to {cycle.most:.2f} s"),
                 ("throughput", throughput_text(cycle.throughput)),
+                *([("put down at", cycle.put_down)] if cycle.put_down else []),
             ]
         )
     if cycle.ends:

@@ -6,6 +6,8 @@ points down into a narrow bin that no link can touch; only the part can.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -14,11 +16,12 @@ from reachmap.core.planning.lift import Lifts
 from reachmap.errors import SceneError
 from reachmap.geometry import rotation_from_quaternion_wxyz, transform_from_parts
 from reachmap.maps import Status, read_bin_map
+from reachmap.maps.cycle.summary import summarise_cycle
 from reachmap.maps.parts import StageStatus
 from reachmap.runtime.options import RunOptions
 from reachmap.scans.cycle.fresh import FreshCycles
 from reachmap.scans.cycle.scenes import STAGES, CycleScenes
-from reachmap.tools.bin_scan import bin_scan
+from reachmap.tools.bin_scan import bin_scan, summary_of_bin
 from reachmap.tools.check import check
 from tests.support.cycle_replay import faults_of_cycle, paths_by_stage
 
@@ -300,6 +303,12 @@ def test_the_nearer_of_two_places_is_taken(tmp_path):
         record.cycle.cycle_time[whole],
         np.minimum(*(one.cycle.cycle_time for one in single))[whole],
     )
+    told: Any = summarise_cycle(record)
+    assert told.put_down == f"far 0, near {whole.sum()}"
+    said = summary_of_bin(record)
+    assert said["whole_cycles_percent"] == pytest.approx(100 * whole.mean(), abs=0.01)
+    mean_s = np.nanmean(record.cycle.cycle_time)
+    assert said["cycle_time_s"] == pytest.approx(mean_s, abs=0.01)
 
 
 def test_the_map_does_not_depend_on_the_workers(tmp_path, toy):

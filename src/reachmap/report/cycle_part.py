@@ -54,6 +54,8 @@ def _words(cycle: CycleSummary) -> str:
         f"whole cycle ({percent(cycle.reachability)} of all test grasps): "
         f"{cycle.sentence}."
     )
+    if cycle.put_down:
+        text += f" Whole cycles by where the part is put down: {cycle.put_down}."
     made = cycle.throughput
     if made is None:
         return text

@@ -21,6 +21,7 @@ from reachmap.maps import (
     read_workspace_map,
 )
 from reachmap.maps.base.format import read_base
+from reachmap.maps.cycle.summary import summarise_cycle
 from reachmap.maps.provenance import cell_of_artefact
 from reachmap.maps.summary.clearance import clearance_shares
 from reachmap.runtime.job import Work
@@ -176,6 +177,19 @@ def summary_of_bin(bin_map: BinMap | None) -> dict[str, Any]:
         "reachable_after_1_attempt_percent": round(100 * float(first.mean()), 2),
         "path_reachability_percent": round(100 * float(reachable.mean()), 2),
         **kept,
+        **_summary_of_cycles(bin_map),
+    }
+
+
+def _summary_of_cycles(bin_map: BinMap) -> dict[str, Any]:
+    cycle = summarise_cycle(bin_map)
+    if cycle is None:
+        return {}
+    made = cycle.throughput
+    return {
+        "whole_cycles_percent": round(cycle.reachability, 2),
+        "cycle_time_s": None if made is None else round(cycle.seconds, 2),
+        "picks_per_hour": None if made is None else round(made.picks_per_hour),
     }
 
 

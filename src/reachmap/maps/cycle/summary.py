@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
+import json
 from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
 
+from reachmap._typing import BoolArray
 from reachmap.maps.cycle.seconds import (
     TO_GRASP,
     Throughput,
@@ -74,8 +77,8 @@ class CycleSummary:
     parts : tuple of PartSeconds
     ends : tuple of CycleEnd
         Most frequent first.
-    drop_offs : tuple of int
-        Whole cycles by the place where the part goes, counted as in the cell.
+    drop_offs : tuple of (str, int)
+        Places where the part may go, as the cell names them, and whole cycles to each.
     throughput : Throughput or None
     """
 
@@ -88,8 +91,15 @@ class CycleSummary:
     most: float
     parts: tuple[PartSeconds, ...]
     ends: tuple[CycleEnd, ...]
-    drop_offs: tuple[int, ...]
+    drop_offs: tuple[tuple[str, int], ...]
     throughput: Throughput | None
+
+    @property
+    def put_down(self) -> str:
+        """Whole cycles to each of several drop-offs, "" where there is one."""
+        if len(self.drop_offs) < 2:
+            return ""
+        return ", ".join(f"{name} {count}" for name, count in self.drop_offs)
 
     @property
     def sentence(self) -> str:
@@ -112,7 +122,6 @@ def summarise_cycle(record: BinMap) -> CycleSummary | None:
     known = cycle.cycle_time[whole]
     nan = float("nan")
     low, middle, high = np.quantile(known, (0, 0.5, 1)) if len(known) else (nan,) * 3
-    places = cycle.drop_off[whole & (cycle.drop_off >= 0)]
     attempted = int((record.status != Status.NOT_ATTEMPTED).sum())
     return CycleSummary(
         reached=int((record.status == Status.PATH_FOUND).sum()),
@@ -124,9 +133,35 @@ def summarise_cycle(record: BinMap) -> CycleSummary | None:
         most=float(high),
         parts=_parts(record),
         ends=_ends(record),
-        drop_offs=tuple(np.bincount(places).tolist()) if places.size else (),
+        drop_offs=_drop_offs(record, whole),
         throughput=throughput_of_bin(record),
     )
+
+
+def _drop_offs(record: BinMap, whole: BoolArray) -> tuple[tuple[str, int], ...]:
+    assert record.cycle is not None
+    place = record.cycle.drop_off[whole & (record.cycle.drop_off >= 0)]
+    names = drop_off_names(record, int(place.max(initial=-1)) + 1)
+    counts = np.bincount(place, minlength=len(names)).tolist()
+    return tuple(zip(names, counts, strict=True))
+
+
+def drop_off_names(record: BinMap, least: int) -> list[str]:
+    """Names of a map's drop-offs in order; numbers where its cell does not tell them.
+
+    Parameters
+    ----------
+    record : BinMap
+    least : int
+        How many there are, if not more.
+    """
+    with contextlib.suppress(ValueError, TypeError, KeyError, RecursionError):
+        given = json.loads(record.provenance.cell_resolved_json)["drop_off"] or []
+        entries = given if isinstance(given, list) else [given]
+        names = [str(entry["name"]) for entry in entries]
+        if len(names) >= least:
+            return names
+    return [f"drop-off {k + 1}" for k in range(least)]
 
 
 def _parts(record: BinMap) -> tuple[PartSeconds, ...]:
