@@ -48,16 +48,15 @@ def draw_causes(record: WorkspaceMap | BinMap) -> Figure:
     kind = "test grasps" if isinstance(record, BinMap) else "test frames"
     blocks = _blocks(record, causes, total, kind)
     heights = [ROW * max(len(block.bars), 1) for block in blocks]
-    figure = new_figure(
-        LEFT + WIDTH + RIGHT, sum(heights) + GAP * len(blocks) + TOP - GAP + BOTTOM
-    )
-    bottom = BOTTOM
-    for block, height in reversed(list(zip(blocks, heights, strict=True))):
+    bottom = BOTTOM + sum(heights) + GAP * (len(blocks) - 1)
+    figure = new_figure(LEFT + WIDTH + RIGHT, bottom + TOP)
+    for block, height in zip(blocks, heights, strict=True):
+        bottom -= height
         axes = axes_at(figure, LEFT, bottom, WIDTH, height)
         names, values, colours = zip(*block.bars, strict=True)
         _draw_bars(axes, list(names), list(values), list(colours))
         axes.set_title(block.title, loc="left", pad=5)
-        bottom += height + GAP
+        bottom -= GAP
     reached = 100.0 * causes.states.get(Status.PATH_FOUND, 0) / total
     more = len(causes.pairs) - PAIRS_SHOWN
     said = (

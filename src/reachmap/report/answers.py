@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from reachmap.maps.cycle.summary import summarise_cycle
 from reachmap.maps.summary.clearance import clearance_shares
 from reachmap.maps.summary.directions import reached_shares
 from reachmap.maps.summary.emptying import emptying_of
@@ -17,18 +18,19 @@ from reachmap.maps.summary.statistics import (
 from reachmap.report.blocks import Tile
 from reachmap.report.folder import RunFolder
 from reachmap.report.numbers import count, interval, number, percent, signed
-from reachmap.report.ranked_rows import ranked_rows
+from reachmap.report.ranked_rows import cost_of_list, ranked_rows
 
 FIRST_PICKS = 3
 
 
 def headline_answers(run: RunFolder) -> list[Tile]:
-    """Tiles: best level, bin, share of test grasps, room, emptying, first picks."""
+    """Tiles: level, bin, share of test grasps, room, cycle, emptying, first picks."""
     tiles = [
         _level(run),
         _bin(run),
         _share(run),
         _clearance(run),
+        _cycle(run),
         _emptying(run),
         _picks(run),
     ]
@@ -128,6 +130,26 @@ def _clearance(run: RunFolder) -> Tile | None:
     )
 
 
+def _cycle(run: RunFolder) -> Tile | None:
+    """Only where the bin was scanned with the part in hand."""
+    found = None if run.bin_map is None else summarise_cycle(run.bin_map)
+    if found is None:
+        return None
+    question = "What does a pick take, with the part in hand?"
+    whole = f"{percent(found.reachability)} of the test grasps have a whole cycle"
+    made = found.throughput
+    if made is None:
+        return _tile(question, "no whole cycle", f"{whole}.")
+    longest = max(found.parts, key=lambda part: part.seconds)
+    return _tile(
+        question,
+        f"{number(found.seconds, 2, 's')}, "
+        f"{number(made.picks_per_hour, 0)} picks per hour",
+        f"{whole}; most of the time goes to the {longest.name} "
+        f"({number(100 * longest.share, 0)} %).",
+    )
+
+
 def _emptying(run: RunFolder) -> Tile | None:
     """Only where the bin was scanned at several levels of filling."""
     found = None if run.bin_map is None else emptying_of(run.bin_map)
@@ -157,9 +179,11 @@ def _picks(run: RunFolder) -> Tile:
             question, "none", f"None of {count(len(rows), 'grasp')} is reached."
         )
     first = reached[:FIRST_PICKS]
+    by_seconds = cost_of_list(run.ranked[0]) == "cycle"
+    cost = "Predicted seconds per pick:" if by_seconds else "With cost J ="
     return _tile(
         question,
         ", ".join(row.name for row in first),
-        f"With cost J = {', '.join(number(row.cost, 2) for row in first)}. "
+        f"{cost} {', '.join(number(row.cost, 2) for row in first)}. "
         f"{len(reached)} of {count(len(rows), 'supplied grasp')} are reached.",
     )

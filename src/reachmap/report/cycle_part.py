@@ -40,7 +40,7 @@ def cycle_blocks(record: BinMap) -> Blocks:
         blocks.append(drawn(draw_timeline(record, cycle), said, record))
     if cycle.ends:
         rows = [
-            (end.grasps, end.stage, end.status, end.pair)
+            (end.grasps, end.stage, end.status, end.pair.replace(" | ", " – "))
             for end in cycle.ends[:ENDS_SHOWN]
         ]
         head = ("test grasps", "stage", "outcome", "bodies in the way")

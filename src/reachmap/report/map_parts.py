@@ -232,7 +232,7 @@ def bin_section(record: BinMap) -> Section:
         _shares_paragraph(summary),
         _saturation(record),
         _evidence_paragraph(summary.unreached),
-        Heading("What a pick takes"),
+        Heading("What the way to a grasp takes"),
         _measure_table(summary),
     )
 

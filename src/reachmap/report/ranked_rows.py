@@ -52,6 +52,11 @@ def known_number(value: Any) -> float | None:
     return number if math.isfinite(number) else None
 
 
+def cost_of_list(document: Mapping[str, Any]) -> str:
+    """What a ranked list is ordered by: ``cycle``, else ``paper``."""
+    return "cycle" if document["reachmap"].get("cost") == "cycle" else "paper"
+
+
 def ranked_rows(document: Mapping[str, Any]) -> list[RankedRow]:
     """Rows of a ranked list, in its order; grasps that were not ranked are left out."""
     return [

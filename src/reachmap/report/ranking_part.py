@@ -27,6 +27,7 @@ from reachmap.report.blocks import (
 from reachmap.report.numbers import NONE, count, number
 from reachmap.report.ranked_rows import (
     RankedRow,
+    cost_of_list,
     known_number,
     ranked_rows,
     weights_of,
@@ -54,7 +55,7 @@ def ranking_section(
         name = f"List {index + 1}" if len(documents) > 1 else ""
         if name:
             parts.append(Heading(name))
-        cost = _cost_of(document)
+        cost = cost_of_list(document)
         said = _seconds_words if cost == "cycle" else _words
         parts += [paragraph(said(document)), _table(document)]
         groups[cost] += _groups(document, name, names[cost])
@@ -70,10 +71,6 @@ def ranking_section(
                 )
             )
     return section("ranking", "Which grasps come first", parts)
-
-
-def _cost_of(document: Mapping[str, Any]) -> str:
-    return "cycle" if document["reachmap"].get("cost") == "cycle" else "paper"
 
 
 def _words(document: Mapping[str, Any]) -> str:
@@ -111,7 +108,7 @@ def _counted(document: Mapping[str, Any]) -> str:
 
 def _table(document: Mapping[str, Any]) -> Table:
     names, unit = TERMS, "J"
-    if _cost_of(document) == "cycle":
+    if cost_of_list(document) == "cycle":
         names, unit = (TO_GRASP, PLANNING, FAILURE), "seconds"
     rows = [
         (
@@ -131,7 +128,7 @@ def _table(document: Mapping[str, Any]) -> Table:
 
 def _terms_of(documents: Sequence[Mapping[str, Any]], cost: str) -> list[str]:
     """Terms that any of the lists with this cost was ranked by."""
-    own = [document for document in documents if _cost_of(document) == cost]
+    own = [document for document in documents if cost_of_list(document) == cost]
     known = dict.fromkeys(k for d in own for row in ranked_rows(d) for k in row.terms)
     if cost == "cycle":
         return [name for name in known if name not in TERM_NAMES]

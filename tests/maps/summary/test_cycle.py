@@ -14,8 +14,11 @@ from reachmap.maps.cycle.seconds import cycle_parts, throughput_of_bin
 from reachmap.maps.cycle.summary import summarise_cycle
 from reachmap.maps.parts import StageStatus
 from reachmap.plots.bin_map import draw_cycle
+from reachmap.plots.causes import draw_causes
 from reachmap.plots.curves.timeline import draw_timeline
+from reachmap.report.answers import headline_answers
 from reachmap.report.cycle_part import cycle_blocks
+from reachmap.report.folder import RunFolder
 from tests.support.cycle_maps import WAITS_S, with_cycles
 from tests.support.synthetic_maps import synthetic_bin_map
 
@@ -107,7 +110,21 @@ def test_cycles_are_told_drawn_and_reported():
     assert sum(bar.get_width() for bar in bars) == pytest.approx(found.seconds)
     assert len(draw_cycle(record).axes) == 4
     assert cycle_blocks(record) is not None
+    ends = draw_causes(record).axes[2]
+    assert ends.get_title(loc="left").startswith("reached, but no whole cycle")
+    drawn: Any = ends.patches
+    lost = sum(end.grasps for end in found.ends[:10])
+    share = 100 * lost / record.status.size
+    assert sum(bar.get_width() for bar in drawn) == pytest.approx(share)
+    tiles = headline_answers(RunFolder(name="run", bin_map=record))
+    (tile,) = [tile for tile in tiles if "with the part in hand" in tile.question]
+    assert f"{found.seconds:.2f} s" in tile.reply
     plain = synthetic_bin_map()
+    assert len(draw_causes(plain).axes) == 2
+    assert not any(
+        "in hand" in tile.question
+        for tile in headline_answers(RunFolder(name="run", bin_map=plain))
+    )
     assert summarise_cycle(plain) is None
     assert cycle_lines(None) == []
     assert cycle_blocks(plain) is None
