@@ -16,6 +16,7 @@ from reachmap.motions.library import MotionLibrary, ServedMotion
 from reachmap.motions.motion import best_rows, way_points
 from reachmap.tools.bin_scan import bin_scan
 from tests.support.dense_checks import DenseCheck
+from tests.support.kinematics_arms import Link, serial_urdf
 from tests.support.toy_artefacts import toy_bin_map
 from tests.support.toy_truth import OVERRIDES, clear_rows, slack_of
 
@@ -159,3 +160,53 @@ def test_a_map_that_names_no_best_paths_serves_the_shortest(map_path: Path) -> N
     np.testing.assert_allclose(
         served.approach[-1], way_points(record, row)[1][-1], atol=1e-5
     )
+
+
+FOUR_AXES = """\
+format: reachmap.cell
+format_version: "1.0"
+name: four axes
+robot:
+  urdf: arm.urdf
+  tcp: {parent: link_4, xyz: [0, 0, 0.1], approach_axis: "+z"}
+  limits: {acceleration_rad_s2: 4.0}
+tool: {roll: free}
+bodies:
+  - name: rod
+    attach_to: link_4
+    shape: {cylinder: {radius: 0.01, length: 0.09}}
+    pose: {xyz: [0, 0, 0.045]}
+bin: {inner: [0.2, 0.2, 0.04], wall: 0.01, pose: {xyz: [0.4, 0, -0.1]}}
+scan_configuration: {q_deg: {joint_1: 0, joint_2: 0, joint_3: 120, joint_4: 60}}
+workspace_scan:
+  cubes: [{name: all, min: [0.2, -0.2, 0], max: [0.6, 0.2, 0], grid: [3, 3]}]
+  z_step: 0.1
+  orientations: {family: list, rpy_deg: [[180, 0, 0]]}
+bin_scan:
+  grid: [4, 4]
+  layers: [0.02]
+  orientations: {family: list, rpy_deg: [[180, 0, 0]]}
+  repeats: 1
+  approach_distance_m: 0.05
+"""
+
+
+def test_an_arm_of_four_axes_is_served_at_its_own_roll(tmp_path: Path) -> None:
+    """Its yaw follows from the place: point and direction are met, and free."""
+    turn_y = [Link(xyz=(0, 0, z), axis=(0, 1, 0)) for z in (0.0, 0.3, 0.3)]
+    (tmp_path / "arm.urdf").write_text(serial_urdf([Link(xyz=(0, 0, 0.1)), *turn_y]))
+    (tmp_path / "cell.yaml").write_text(FOUR_AXES)
+    bin_scan(None, tmp_path / "bin.h5", cell=str(tmp_path / "cell.yaml"))
+    library = MotionLibrary.from_map(tmp_path / "bin.h5")
+    scene = library.scenes[0]
+    check = DenseCheck(scene, margin_m=0.0)
+    rng = np.random.default_rng(6)
+    for x, y in rng.uniform(-0.07, 0.07, (20, 2)):
+        point = [0.4 + x, y, -0.08]
+        served = library.serve(point, [0.0, 0.0, -1.0])
+        assert served is not None
+        T = scene.kinematics.forward(served.approach[-1])
+        np.testing.assert_allclose(T[:3, 3], point, atol=1e-6)
+        np.testing.assert_allclose(T[:3, 2], [0, 0, -1], atol=1e-6)
+        assert served.approach[-1][0] == pytest.approx(np.arctan2(y, 0.4 + x), abs=1e-5)
+        assert check.path_is_free(np.vstack([served.planned, served.approach[1:]]))

@@ -210,7 +210,7 @@ class MotionLibrary:
             served = start and self._bring(place, *start, check=check)
             if served:
                 return served
-        if query.free[0] and check:
+        if query.free[0] and check and not self.scenes[0].kinematics.any_roll:
             return self._turned(places[:TURNED_TRIES], query)
         return None
 
@@ -242,10 +242,16 @@ class MotionLibrary:
         """Tool pose of the grasp and its configuration on the branch of a path."""
         _, way = way_points(self._map, int(self._rows[place]))
         T = self._tool_pose(place, query)
-        found = self.scenes[self._level(place)].kinematics.follow(
-            way[-1], T[None], largest_step_rad=LARGEST_STEP_RAD
+        kinematics = self.scenes[self._level(place)].kinematics
+        free = bool(query.free[0])
+        found = kinematics.follow(
+            way[-1], T[None], largest_step_rad=LARGEST_STEP_RAD, own_roll=free
         )
-        return None if found is None else (T, found[0])
+        if found is None:
+            return None
+        if free and kinematics.any_roll:
+            T = kinematics.forward(found[0])
+        return T, found[0]
 
     def _turned(
         self, places: list[tuple[int, int]], query: Queries

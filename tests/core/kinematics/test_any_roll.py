@@ -58,6 +58,26 @@ def test_poses_are_met_whatever_their_roll(name: str) -> None:
         np.testing.assert_allclose(met[:3, 2:], T[k][:3, 2:], atol=1e-6)
 
 
+@pytest.mark.parametrize("name", ARMS)
+def test_a_branch_is_followed_at_the_roll_that_it_has(name: str) -> None:
+    """To a pose near by whose roll is any other; the full pose is not met."""
+    arm = arm_of(ARMS[name])
+    kinematics = Kinematics(arm, any_roll_about="+z")
+    rng = np.random.default_rng(3)
+    followed = 0
+    for _ in range(50):
+        q = rng.uniform(arm.lower_rad, arm.upper_rad) / 2
+        near = pinocchio_tcp(arm, q + rng.uniform(-0.05, 0.05, arm.dof))
+        goal = rolled(near[None], "z")
+        assert kinematics.follow(q, goal) is None
+        met = kinematics.follow(q, goal, own_roll=True)
+        if met is not None:
+            followed += 1
+            T = pinocchio_tcp(arm, met[0])
+            np.testing.assert_allclose(T[:3, 2:], near[:3, 2:], atol=2e-6)
+    assert followed >= 40
+
+
 def test_a_vertical_tool_is_met_just_within_the_ring_of_the_wrist() -> None:
     """The wrist of the arm is 0.6 m at most from its shoulder, which is at (0, 0.1)."""
     kinematics = Kinematics(arm_of(FOUR), any_roll_about="+z")

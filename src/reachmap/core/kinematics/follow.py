@@ -35,6 +35,7 @@ class Follower:
         *,
         tolerance: float,
         largest_step_rad: float,
+        free_axis: FloatArray | None = None,
     ) -> FloatArray | None:
         """Meet poses one after the other.
 
@@ -48,6 +49,8 @@ class Follower:
             Largest miss of a pose [m and rad].
         largest_step_rad : float
             Largest change of a joint from pose to pose [rad or m].
+        free_axis : array, shape (3,), optional
+            Unit vector in the TCP frame that poses may be turned about.
 
         Returns
         -------
@@ -61,7 +64,7 @@ class Follower:
         for k, pose in enumerate(T):
             goal = self._root_base * pin.SE3(np.asarray(pose, float))
             # Joints go on as they went: one step less to the goal.
-            met = self._meet(q + change, goal, tolerance, largest_step_rad)
+            met = self._meet(q + change, goal, tolerance, largest_step_rad, free_axis)
             if met is None or np.abs(met - q).max() > largest_step_rad:
                 return None
             change = met - q if k else change
@@ -69,18 +72,28 @@ class Follower:
         return found
 
     def _meet(
-        self, q_start: FloatArray, goal: object, tolerance: float, largest: float
+        self,
+        q_start: FloatArray,
+        goal: pin.SE3,
+        tolerance: float,
+        largest: float,
+        free_axis: FloatArray | None,
     ) -> FloatArray | None:
         robot, data = self._robot, self._data
         q = q_start
         for _ in range(_ITERATIONS):
             pin.computeJointJacobians(robot.model, data, q)
             T_root_tcp = pin.updateFramePlacement(robot.model, data, self._tcp)
-            error = pin.log6(T_root_tcp.actInv(goal)).vector
+            T_tcp_goal = T_root_tcp.actInv(goal)
+            if free_axis is not None:
+                T_tcp_goal = _least_turned(T_tcp_goal, free_axis)
+            error = pin.log6(T_tcp_goal).vector
             if max(error[:3] @ error[:3], error[3:] @ error[3:]) <= tolerance**2:
                 inside = (q >= robot.lower_rad).all() and (q <= robot.upper_rad).all()
                 return q if inside else None
             J = pin.getFrameJacobian(robot.model, data, self._tcp, pin.LOCAL)
+            if free_axis is not None:
+                J[3:] -= np.outer(free_axis, free_axis @ J[3:])
             damping = 1e-2 * (error @ error) + 1e-12
             normal = J.T @ J
             normal.flat[:: len(q) + 1] += damping
@@ -88,6 +101,12 @@ class Follower:
             if np.abs(q - q_start).max() > largest:
                 return None
         return None
+
+
+def _least_turned(T: pin.SE3, axis: FloatArray) -> pin.SE3:
+    """Turn a pose about an axis of its own, so that it is rotated the least."""
+    R = pin.Quaternion.FromTwoVectors(axis, T.rotation @ axis).toRotationMatrix()
+    return pin.SE3(R, T.translation)
 
 
 def follow_many(

@@ -14,6 +14,7 @@ from reachmap.core.kinematics.solvers.arm import Arm, BranchSolver
 from reachmap.core.kinematics.solvers.choice import choose_solver
 from reachmap.core.robot.chain import SerialChain
 from reachmap.core.robot.model import RobotModel
+from reachmap.geometry import axis_vector
 
 
 class Kinematics:
@@ -67,11 +68,13 @@ class Kinematics:
         )
         axis = any_roll_about
         self.any_roll = axis is not None and has_own_roll(self.chain, axis)
-        self._solver: BranchSolver = (
-            AnyRollSolver(arm, axis)
-            if axis is not None and self.any_roll
-            else choose_solver(arm)
-        )
+        self._roll_axis: FloatArray | None = None
+        self._solver: BranchSolver
+        if axis is not None and self.any_roll:
+            self._roll_axis = axis_vector(axis)
+            self._solver = AnyRollSolver(arm, axis)
+        else:
+            self._solver = choose_solver(arm)
         self._follower = Follower(robot)
         self._data = robot.model.createData()
 
@@ -196,6 +199,7 @@ class Kinematics:
         *,
         tolerance: float | None = None,
         largest_step_rad: float = 0.2,
+        own_roll: bool = False,
     ) -> FloatArray | None:
         """Follow poses that lie close to each other, a straight approach for example.
 
@@ -210,6 +214,9 @@ class Kinematics:
             solutions if that is larger.
         largest_step_rad : float
             Largest change of a joint from pose to pose.
+        own_roll : bool
+            Whether poses are met at the roll that the arm has there, where it has
+            `any_roll`.
 
         Returns
         -------
@@ -220,5 +227,9 @@ class Kinematics:
         if tolerance is None:
             tolerance = max(1e-6, self.tolerance)
         return self._follower.follow(
-            q_start, T, tolerance=tolerance, largest_step_rad=largest_step_rad
+            q_start,
+            T,
+            tolerance=tolerance,
+            largest_step_rad=largest_step_rad,
+            free_axis=self._roll_axis if own_roll else None,
         )
