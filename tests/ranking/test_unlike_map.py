@@ -158,6 +158,46 @@ def test_usual_mistakes_are_asked_about(
     assert any(question in doubt for doubt in document["reachmap"]["doubts"])
 
 
+@pytest.mark.parametrize(
+    ("change", "question"),
+    [
+        ("shrunk", "are these metres, not millimetres?"),
+        ("exchanged", "turned by a quarter about z"),
+        ("other base", "turned by half about z"),
+    ],
+)
+def test_frames_and_units_that_nearly_fit_are_asked_about(
+    folder: Path, change: str, question: str
+) -> None:
+    """Metres called millimetres fall onto the origin; x and y exchanged mostly fit."""
+    data = json.loads((folder / "pile-1.json").read_text())
+    T = BIN_MAP.bin_pose
+    for grasp in data["grasps"]:
+        point, axis = (np.array(grasp[name]) for name in ("position", "direction"))
+        if change == "exchanged":
+            point, axis = point[[1, 0, 2]], axis[[1, 0, 2]]
+        if change == "other base":
+            point, axis = T[:3, :3] @ point + T[:3, 3], T[:3, :3] @ axis
+            point, axis = point * [-1, -1, 1], axis * [-1, -1, 1]
+            data["frame"] = "robot_base"
+        grasp["position"], grasp["direction"] = point.tolist(), axis.tolist()
+    if change == "shrunk":
+        data["units"] = {"length": "mm"}
+    (folder / "odd.json").write_text(json.dumps(data))
+    result = run("odd.json")
+    assert question in result.stderr
+    (doubt,) = json.loads(result.stdout)["reachmap"]["doubts"]
+    assert question in doubt
+
+
+def test_one_grasp_at_the_origin_raises_no_question(folder: Path) -> None:
+    """It is in no unit at all."""
+    data = json.loads((folder / "pile-1.json").read_text())
+    data["grasps"] = [{"position": [0.0, 0.0, 0.0], "direction": [0.0, 0.0, -1.0]}]
+    (folder / "odd.json").write_text(json.dumps(data))
+    assert json.loads(run("odd.json").stdout)["reachmap"]["doubts"] == []
+
+
 def test_a_list_that_fits_raises_no_question(folder: Path) -> None:
     """As supplied."""
     result = run("pile-1.json")

@@ -1,7 +1,7 @@
-"""Questions that a list raises of which the map knows next to nothing.
+"""Questions that a list raises of which the map knows less than it should.
 
 A list in other units, with normals for approach directions or in another frame looks
-well-formed, and every row of it is wrong. Where most of a list is unlike the map, the
+well-formed, and every row of it is wrong. Where part of a list is unlike the map, the
 usual mistakes are undone one by one; one that would make it alike is asked about.
 """
 
@@ -13,11 +13,15 @@ from typing import Final
 
 import numpy as np
 
+from reachmap.geometry import yaw_transform
 from reachmap.ranking.lists.arrays import GraspList
 from reachmap.ranking.lookup.order import UNMATCHED, Ranking
 
+SOME: Final = 0.1
+"""Share of unmatched grasps from which a list is looked at more closely: a heap has a
+few that lean too far or lie too near a wall."""
 MANY: Final = 0.3
-"""Share of unmatched grasps from which a list is looked at more closely."""
+"""Share from which it is asked about even where no mistake explains it."""
 RESOLVED: Final = 0.7
 """Share of those that a mistake, undone, must bring back to be asked about."""
 
@@ -25,6 +29,7 @@ RESOLVED: Final = 0.7
 # No arm in the field reaches beyond 5 m, and no bin is 2 mm wide.
 MILLIMETRES_FROM_M: Final = 5.0
 METRES_BELOW_M: Final = 2e-3
+NOWHERE_M: Final = 1e-6
 
 
 def matched_count(ranking: Ranking) -> int:
@@ -52,31 +57,43 @@ def plausibility_questions(
     """
     total, matched = len(grasps), matched_count(ranking)
     missing = total - matched
-    if not total or missing < MANY * total:
+    # A shrunk list falls onto the origin, which may lie in the map.
+    far_m = float(np.median(np.linalg.norm(grasps.points, axis=1))) if total else 0.0
+    if NOWHERE_M < far_m < METRES_BELOW_M:
+        grown = matched_count(rank(_scaled(grasps, 1e3)))
+        if grown >= max(matched, RESOLVED * total):
+            return (
+                f"half of the points lie within {1e3 * far_m:.2g} mm of the origin; "
+                f"are these metres, not millimetres? ({grown} of {total} would be in "
+                "the map)",
+            )
+    if not total or missing < SOME * total:
         return ()
     what = f"{missing} of {total} grasps are nowhere near what the map knows"
-    for question, other in _usual_mistakes(grasps):
+    for question, other in _usual_mistakes(grasps, far_m):
         better = matched_count(rank(other))
         if better - matched >= RESOLVED * missing:
             return (f"{what}; {question} ({better} would be)",)
+    if missing < MANY * total:
+        return ()
     return (f"{what}; are the frame ({grasps.frame}) and the map right?",)
 
 
-def _usual_mistakes(grasps: GraspList) -> Iterator[tuple[str, GraspList]]:
+def _usual_mistakes(grasps: GraspList, far_m: float) -> Iterator[tuple[str, GraspList]]:
     """Questions, each with the list as it would be without the mistake."""
     normals = "are these outward normals? then direction_convention: outward_normal"
     millimetres = 'are these millimetres? then units: {"length": "mm"}'
-    metres = "are these metres, not millimetres?"
     both = "are these outward normals in millimetres? then state units and convention"
+    quarter = "is the frame turned by a quarter about z, x and y exchanged?"
+    half = "is the frame turned by half about z, as base and base_link of a UR are?"
     yield normals, _turned(grasps)
-    # Any list shrunk to a thousandth falls onto the origin: only what is as far out as
-    # millimetres would be is asked about.
-    far_m = float(np.median(np.linalg.norm(grasps.points, axis=1)))
+    # Only what is as far out as millimetres would be: anything shrunk to a thousandth
+    # falls onto the origin.
     if far_m > MILLIMETRES_FROM_M:
         yield millimetres, _scaled(grasps, 1e-3)
         yield both, _scaled(_turned(grasps), 1e-3)
-    if far_m < METRES_BELOW_M:
-        yield metres, _scaled(grasps, 1e3)
+    yield quarter, _yawed(grasps, np.pi / 2)
+    yield half, _yawed(grasps, np.pi)
 
 
 def _turned(grasps: GraspList) -> GraspList:
@@ -86,6 +103,17 @@ def _turned(grasps: GraspList) -> GraspList:
     turn = about_y if grasps.approach_axis.endswith("x") else about_x
     return replace(
         grasps, directions=-grasps.directions, rotations=grasps.rotations @ turn
+    )
+
+
+def _yawed(grasps: GraspList, angle_rad: float) -> GraspList:
+    """The list in a frame that is turned about z."""
+    R = yaw_transform(0.0, 0.0, 0.0, angle_rad)[:3, :3]
+    return replace(
+        grasps,
+        points=grasps.points @ R.T,
+        directions=grasps.directions @ R.T,
+        rotations=R @ grasps.rotations,
     )
 
 
