@@ -12,7 +12,7 @@ from reachmap.cli.answers import say
 from reachmap.cli.list_options import list_options
 
 if TYPE_CHECKING:
-    from reachmap.ranking.lookup.settings import CostBasis, RankSettings
+    from reachmap.ranking.lookup.settings import CostBasis, Invalid, RankSettings
     from reachmap.tools.rank import RankAnswer
 
 AXES = ("+x", "-x", "+y", "-y", "+z", "-z")
@@ -68,6 +68,14 @@ class ShareType(click.ParamType):  # type: ignore[type-arg, unused-ignore]
     type=click.Choice(AXES),
     help="Approach axis of imported orientations, instead of their format's.",
 )
+@click.option(
+    "--invalid",
+    type=click.Choice(["raise", "mark"]),
+    default="raise",
+    show_default=True,
+    help="What becomes of grasps whose position or orientation is none (NaN, no "
+    "length, no rotation): the list is refused, or they come last as invalid.",
+)
 @options.cell_option
 @options.set_option
 @click.option(
@@ -111,6 +119,7 @@ def command(
     frame: str | None,
     frame_pose: tuple[float, ...] | None,
     approach_axis: str | None,
+    invalid: Invalid,
     cell: str | None,
     overrides: tuple[str, ...],
     force: bool,
@@ -154,6 +163,7 @@ def command(
             frame=frame,
             frame_pose=frame_pose,
             approach_axis=approach_axis,
+            invalid=invalid,
         ),
         cell=cell,
         overrides=overrides,

@@ -190,6 +190,82 @@ def test_frames_and_units_that_nearly_fit_are_asked_about(
     assert question in doubt
 
 
+@pytest.mark.parametrize(
+    ("key", "order", "question"),
+    [
+        ("quaternion_wxyz", [1, 2, 3, 0], "are quaternions in the other order?"),
+        ("quaternion_xyzw", [0, 1, 2, 3], "are quaternions in the other order?"),
+        ("quaternion_wxyz", [0, 1, 2, 3], "does the tool's roll not matter?"),
+    ],
+)
+def test_orientations_that_do_not_fit_are_asked_about(
+    folder: Path, key: str, order: list[int], question: str
+) -> None:
+    """Quaternions of the map in the wrong order, and turned away about the approach."""
+    place = (0, 2, 3)
+    R = Rotation.from_quat(np.roll(BIN_MAP.quaternion_wxyz[place], -1, axis=1))
+    if "roll" in question:
+        axis = {"x": [1, 0, 0], "y": [0, 1, 0], "z": [0, 0, 1]}
+        turn = np.array(axis[BIN_MAP.approach_axis[1]])
+        # As far from the rolls of each direction as can be.
+        R = max(
+            (R[:1] * Rotation.from_rotvec(a * turn) for a in np.linspace(0, 6.2, 60)),
+            key=lambda one: min((one.inv() * R).magnitude()),
+        )
+    wxyz = np.roll(R.as_quat(), 1, axis=1)
+    grasps = [{"position": POINT.tolist(), key: q[order].tolist()} for q in wxyz]
+    head = {"format": "reachmap.grasps", "format_version": "1.0"}
+    axis_name = {"approach_axis": BIN_MAP.approach_axis, "frame": "robot_base"}
+    (folder / "odd.json").write_text(
+        json.dumps({**head, **axis_name, "grasps": grasps})
+    )
+    result = run("odd.json")
+    assert result.exit_code == 0, result.stderr
+    assert question in result.stderr
+
+
+def test_rows_of_a_list_that_are_no_grasps_can_be_marked(folder: Path) -> None:
+    """With --invalid mark they come last, and the others are ranked as without them."""
+    data = json.loads((folder / "pile-1.json").read_text())
+    good = json.loads(run("pile-1.json").stdout)["grasps"]
+    down = {"direction": [0.0, 0.0, -1.0]}
+    bad = [
+        {"id": "nan", "position": [float("nan"), 0.0, 0.0], **down},
+        {"id": "nowhere", "position": [0.0, 0.0, 0.0], "direction": [0.0, 0.0, 0.0]},
+        {"id": "long", "position": [0.0, 0.0, 0.0], "quaternion_wxyz": [0, 2, 0, 0]},
+        {"id": "mirror", "position": [0.0, 0.0, 0.0],
+         "rotation_matrix": [[1, 0, 0], [0, 1, 0], [0, 0, -1]]},
+    ]  # fmt: skip
+    data["grasps"][3:3] = bad
+    (folder / "odd.json").write_text(json.dumps(data))
+    refused = run("odd.json")
+    assert refused.exit_code == 2
+    assert refused.stdout == ""
+    assert "grasps[3].position[0]: expected a finite number" in refused.stderr
+    result = run("odd.json", "--invalid", "mark")
+    assert result.exit_code == 0
+    assert "grasps[3].position[0]: expected a finite number (got NaN)" in result.stderr
+    ranked = json.loads(result.stdout, parse_constant=lambda name: pytest.fail(name))
+    schema = json.loads(CliRunner().invoke(group, ["schema", "ranked"]).stdout)
+    jsonschema.validate(ranked, schema)
+    marked = [g["id"] for g in ranked["grasps"] if g["reachmap"]["status"] == "invalid"]
+    assert marked == [g["id"] for g in bad]
+    others = [g for g in ranked["grasps"] if g["id"] not in marked]
+    assert [(g["id"], g["reachmap"]["cost"]) for g in others] == [
+        (g["id"], g["reachmap"]["cost"]) for g in good
+    ]
+
+
+def test_what_is_no_number_of_a_grasp_is_refused_all_the_same(folder: Path) -> None:
+    """A misspelt key is the mistake of whoever writes the lists."""
+    data = json.loads((folder / "pile-1.json").read_text())
+    data["grasps"][0]["approach"] = data["grasps"][0].pop("direction")
+    (folder / "odd.json").write_text(json.dumps(data))
+    result = run("odd.json", "--invalid", "mark")
+    assert result.exit_code == 2
+    assert "approach: unknown key; called direction here" in result.stderr
+
+
 def test_one_grasp_at_the_origin_raises_no_question(folder: Path) -> None:
     """It is in no unit at all."""
     data = json.loads((folder / "pile-1.json").read_text())

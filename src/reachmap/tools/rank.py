@@ -26,7 +26,7 @@ from reachmap.ranking.lists.arrays import GraspList
 from reachmap.ranking.lists.reading import STDIN, read_grasps
 from reachmap.ranking.lookup.calibration import usual_calibration
 from reachmap.ranking.lookup.ranker import Ranker
-from reachmap.ranking.lookup.settings import CostBasis, RankSettings
+from reachmap.ranking.lookup.settings import CostBasis, Invalid, RankSettings
 
 logger = logging.getLogger(__name__)
 
@@ -45,12 +45,15 @@ class ListFormat:
         Pose of the lists' frame in robot_base: x, y, z [m], quaternion wxyz.
     approach_axis : str or None
         Approach axis of imported orientations.
+    invalid : {"raise", "mark"}
+        What becomes of grasps whose numbers are none.
     """
 
     name: str | None = None
     frame: str | None = None
     frame_pose: Sequence[float] | None = None
     approach_axis: str | None = None
+    invalid: Invalid = "raise"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -247,6 +250,7 @@ def read_list(source: str | Path, list_format: ListFormat) -> GraspList:
         source_format=list_format.name,
         frame=frame,
         approach_axis=list_format.approach_axis,
+        invalid=list_format.invalid,
     )
     for warning in grasps.warnings:
         logger.warning("%s", warning)

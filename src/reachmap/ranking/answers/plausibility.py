@@ -13,7 +13,12 @@ from typing import Final
 
 import numpy as np
 
-from reachmap.geometry import yaw_transform
+from reachmap.geometry import (
+    AXES,
+    quaternion_wxyz_from_rotation,
+    rotation_from_quaternion_wxyz,
+    yaw_transform,
+)
 from reachmap.ranking.lists.arrays import GraspList
 from reachmap.ranking.lookup.order import UNMATCHED, Ranking
 
@@ -58,7 +63,8 @@ def plausibility_questions(
     total, matched = len(grasps), matched_count(ranking)
     missing = total - matched
     # A shrunk list falls onto the origin, which may lie in the map.
-    far_m = float(np.median(np.linalg.norm(grasps.points, axis=1))) if total else 0.0
+    away_m = np.linalg.norm(grasps.points[np.isfinite(grasps.points[:, 0])], axis=1)
+    far_m = float(np.median(away_m)) if len(away_m) else 0.0
     if NOWHERE_M < far_m < METRES_BELOW_M:
         grown = matched_count(rank(_scaled(grasps, 1e3)))
         if grown >= max(matched, RESOLVED * total):
@@ -86,6 +92,9 @@ def _usual_mistakes(grasps: GraspList, far_m: float) -> Iterator[tuple[str, Gras
     both = "are these outward normals in millimetres? then state units and convention"
     quarter = "is the frame turned by a quarter about z, x and y exchanged?"
     half = "is the frame turned by half about z, as base and base_link of a UR are?"
+    if grasps.has_rotation.any():
+        yield "does the tool's roll not matter? then --roll free", _unrolled(grasps)
+        yield "are quaternions in the other order?", _reordered(grasps)
     yield normals, _turned(grasps)
     # Only what is as far out as millimetres would be: anything shrunk to a thousandth
     # falls onto the origin.
@@ -104,6 +113,32 @@ def _turned(grasps: GraspList) -> GraspList:
     return replace(
         grasps, directions=-grasps.directions, rotations=grasps.rotations @ turn
     )
+
+
+def _unrolled(grasps: GraspList) -> GraspList:
+    """The list with directions for full orientations."""
+    return replace(
+        grasps,
+        rotations=np.full_like(grasps.rotations, np.nan),
+        has_rotation=np.zeros_like(grasps.has_rotation),
+    )
+
+
+def _reordered(grasps: GraspList) -> GraspList:
+    """The list with the scalar of its quaternions at the other end."""
+    turn = np.zeros(len(grasps), int)
+    for row, grasp in enumerate(grasps.document["grasps"]):
+        # What was read as w x y z was x y z w, and the other way round.
+        turn[row] = ("quaternion_wxyz" in grasp) - ("quaternion_xyzw" in grasp)
+    rotations = grasps.rotations.copy()
+    directions = grasps.directions.copy()
+    index, sign = AXES[grasps.approach_axis]
+    for way in (1, -1):
+        rows = grasps.has_rotation & (turn == way)
+        wxyz = quaternion_wxyz_from_rotation(rotations[rows])
+        rotations[rows] = rotation_from_quaternion_wxyz(np.roll(wxyz, way, axis=-1))
+        directions[rows] = sign * rotations[rows][:, :, index]
+    return replace(grasps, directions=directions, rotations=rotations)
 
 
 def _yawed(grasps: GraspList, angle_rad: float) -> GraspList:

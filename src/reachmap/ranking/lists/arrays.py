@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,8 +14,9 @@ from reachmap.geometry import (
     rotation_from_quaternion_wxyz,
     transform_from_parts,
 )
+from reachmap.maps.bytes.to_json import json_ready
 from reachmap.ranking.lists.document import LENGTH_UNITS
-from reachmap.ranking.lists.fields import ORIENTATIONS
+from reachmap.ranking.lists.fields import ORIENTATIONS, POSE_KEYS
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -68,10 +69,23 @@ class GraspList:
 
 
 def arrays_from_document(
-    document: Mapping[str, Any], source: str, warnings: Sequence[str]
+    document: Mapping[str, Any],
+    source: str,
+    warnings: Sequence[str],
+    invalid: Collection[object] | None = None,
 ) -> GraspList:
-    """Convert a checked document to arrays, in metres and unit vectors."""
+    """Convert a checked document to arrays, in metres and unit vectors.
+
+    Rows that are ``invalid`` become NaN; what is not finite is null where the document
+    is written again.
+    """
     grasps: list[dict[str, Any]] = document["grasps"]
+    if invalid is not None:
+        document = json_ready(document)
+        grasps = [
+            _without_pose(grasp) if row in invalid else grasp
+            for row, grasp in enumerate(grasps)
+        ]
     scale = LENGTH_UNITS[document.get("units", {}).get("length", "m")]
     axis = document.get("approach_axis", "+z")
     rotations = _rotations(grasps)
@@ -96,6 +110,13 @@ def arrays_from_document(
         ids=tuple(str(g.get("id", f"#{n}")) for n, g in enumerate(grasps, 1)),
         warnings=tuple(warnings),
     )
+
+
+def _without_pose(grasp: Mapping[str, Any]) -> dict[str, Any]:
+    """A grasp that is none: NaN for its position and direction."""
+    nowhere = 3 * [np.nan]
+    rest = {key: value for key, value in grasp.items() if key not in POSE_KEYS}
+    return {**rest, "position": nowhere, "direction": nowhere}
 
 
 def _rows(values: list[Any], width: int) -> FloatArray:

@@ -38,6 +38,25 @@ _ROOT_KEYS: Final = (
     "source",
     "grasps",
 )
+# What grasp sources call it, and how it is said here.
+_ORDER = "name the order of its numbers: quaternion_wxyz or quaternion_xyzw"
+_POSE = (
+    "a 4x4 is said as position, its last column, and rotation_matrix, its upper left "
+    "3x3"
+)
+_ROLL = (
+    "a direction leaves the roll open; to fix it give quaternion_wxyz, quaternion_xyzw "
+    "or rotation_matrix"
+)
+_HINTS: Final[Mapping[str, str]] = {
+    **dict.fromkeys(("quaternion", "quat", "orientation"), _ORDER),
+    **dict.fromkeys(("pose", "transform", "transformation", "matrix", "T"), _POSE),
+    **dict.fromkeys(("roll", "roll_deg", "roll_rad", "angle", "yaw"), _ROLL),
+    **dict.fromkeys(("point", "xyz", "translation", "center"), "called position here"),
+    **dict.fromkeys(("approach", "approach_vector", "axis"), "called direction here"),
+    "normal": 'called direction here, with "direction_convention": "outward_normal"',
+    "rotation": "called rotation_matrix here, if it is one",
+}
 _GRASP_KEYS: Final = (
     "id",
     "position",
@@ -96,9 +115,10 @@ def _check_keys(
     for key in value:
         if key in allowed or key.startswith("x_") or (key == "reachmap"):
             continue
+        hint = f"; {_HINTS[key]}" if path and key in _HINTS else ""
         found.mistake(
             (*path, key),
-            f"unknown key; allowed are {', '.join(allowed)} and keys that begin "
+            f"unknown key{hint}; allowed are {', '.join(allowed)} and keys that begin "
             "with x_, which are copied through",
         )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -19,7 +20,7 @@ ORIENTATIONS: Final = (
     "quaternion_xyzw",
     "rotation_matrix",
 )
-_POSE_KEYS: Final = ("position", *ORIENTATIONS[1:])
+POSE_KEYS: Final = ("position", *ORIENTATIONS)
 
 # Published files hold quaternions of length 0.99985 and matrices of three decimals.
 NORM_WARNING: Final = 1e-3
@@ -53,6 +54,8 @@ def shown(value: Any) -> str:
     if value is None or isinstance(value, bool):
         return {None: "null", True: "true", False: "false"}[value]
     text = ascii(value) if isinstance(value, str) else repr(value)
+    if isinstance(value, float):
+        text = json.dumps(value)
     return text if len(text) <= 40 else text[:37] + "…"
 
 
@@ -101,8 +104,8 @@ def check_pose(found: Findings, path: JsonPath, value: Any, scale: float) -> Non
         found.mistake(path, f"expected an object with position (got {shown(value)})")
         return
     for key in value:
-        if key not in _POSE_KEYS:
-            allowed = ", ".join(_POSE_KEYS)
+        if key not in POSE_KEYS or key == "direction":
+            allowed = ", ".join(key for key in POSE_KEYS if key != "direction")
             found.mistake((*path, key), f"unknown key; allowed are {allowed}")
     if "position" in value:
         check_position(found, (*path, "position"), value["position"], scale)

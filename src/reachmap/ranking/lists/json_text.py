@@ -60,7 +60,7 @@ class _Value:
     repeated: bool
 
 
-def parse_json(text: str, source: str) -> Any:
+def parse_json(text: str, source: str, *, finite: bool = True) -> Any:
     """Parse JSON text, refusing what cannot be written back as JSON.
 
     Parameters
@@ -68,6 +68,8 @@ def parse_json(text: str, source: str) -> Any:
     text : str
     source : str
         Name of the file in messages.
+    finite : bool
+        Whether NaN, Infinity and what is as large are refused.
 
     Raises
     ------
@@ -89,7 +91,7 @@ def parse_json(text: str, source: str) -> Any:
     except (ValueError, RecursionError) as error:
         # Integers of thousands of digits, and nesting deeper than the stack.
         raise GraspListError(f"{source}: not usable JSON: {error}") from None
-    if found.repeated or found.not_finite:
+    if found.repeated or (finite and found.not_finite):
         raise GraspListError(limited(_complaints(text, source)))
     return value
 

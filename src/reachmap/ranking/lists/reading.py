@@ -10,9 +10,10 @@ from typing import Any, Final
 from reachmap.errors import GraspListError, SettingsError
 from reachmap.ranking.lists.arrays import GraspList, arrays_from_document
 from reachmap.ranking.lists.document import FORMAT, check_document
-from reachmap.ranking.lists.fields import shown
+from reachmap.ranking.lists.fields import POSE_KEYS, shown
 from reachmap.ranking.lists.importers import FORMATS, NATIVE, document_from_bytes
 from reachmap.ranking.lists.json_text import JsonPath, dotted, limited, lines_of
+from reachmap.ranking.lookup.settings import Invalid
 
 STDIN: Final = "-"
 MAX_BYTES: Final = 32 * 2**20
@@ -24,6 +25,7 @@ def read_grasps(
     source_format: str | None = None,
     frame: str | None = None,
     approach_axis: str | None = None,
+    invalid: Invalid = "raise",
 ) -> GraspList:
     """Read a grasp list in any known format.
 
@@ -38,6 +40,10 @@ def read_grasps(
         Frame of an imported list; native documents name their own.
     approach_axis : str, optional
         Approach axis of an imported list's orientations, instead of its format's.
+    invalid : {"raise", "mark"}
+        What becomes of positions and orientations that are none (NaN, a direction of
+        length 0, a matrix that is no rotation): a mistake, or a grasp that is ranked as
+        ``invalid``.
 
     Raises
     ------
@@ -48,12 +54,16 @@ def read_grasps(
     if source_format is not None and source_format not in FORMATS:
         raise SettingsError(f"unknown format {source_format!r}: {', '.join(FORMATS)}")
     data = _read_bytes(path, source)
-    document, name, text, notes = document_from_bytes(data, source, source_format)
+    document, name, text, notes = document_from_bytes(
+        data, source, source_format, finite=invalid == "raise"
+    )
     if name == NATIVE:
         _refuse_overrides(document, frame, approach_axis, source)
     else:
         document = _imported(document, name, source, frame, approach_axis)
-    return grasps_from_document(document, source=source, text=text, notes=notes)
+    return grasps_from_document(
+        document, source=source, text=text, notes=notes, invalid=invalid
+    )
 
 
 def grasps_from_document(
@@ -62,6 +72,7 @@ def grasps_from_document(
     source: str = "grasps",
     text: str = "",
     notes: Sequence[str] = (),
+    invalid: Invalid = "raise",
 ) -> GraspList:
     """Check a native document and convert it to arrays.
 
@@ -75,6 +86,8 @@ def grasps_from_document(
         The JSON text, for line numbers in messages.
     notes : sequence of str
         Warnings to carry on.
+    invalid : {"raise", "mark"}
+        See :func:`read_grasps`.
 
     Raises
     ------
@@ -82,12 +95,19 @@ def grasps_from_document(
         Every mistake on a line of its own.
     """
     found = check_document(document)
-    if found.mistakes:
+    bad = [one for one in found.mistakes if invalid == "mark" and _is_of_a_pose(one[0])]
+    if len(bad) < len(found.mistakes):
         raise GraspListError(limited(_located(found.mistakes, source, text)))
-    located = limited(_located(found.warnings, source, text))
+    located = limited(_located([*bad, *found.warnings], source, text))
     prefix = f"{source}: "
     warnings = [*(prefix + note for note in notes), *located]
-    return arrays_from_document(_without_results(document), source, warnings)
+    rows = {path[1] for path, _ in bad} if invalid == "mark" else None
+    return arrays_from_document(_without_results(document), source, warnings, rows)
+
+
+def _is_of_a_pose(path: JsonPath) -> bool:
+    """Whether a mistake is in the numbers of a grasp, which then is none."""
+    return path[:1] == ("grasps",) and len(path) > 2 and path[2] in POSE_KEYS
 
 
 def _read_bytes(path: str | Path, source: str) -> bytes:

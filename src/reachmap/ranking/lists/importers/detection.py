@@ -30,7 +30,7 @@ FORMATS: Final = (NATIVE, "isaac_grasp", "graspgen", *_ARRAYS)
 
 
 def document_from_bytes(
-    data: bytes, source: str, name: str | None = None
+    data: bytes, source: str, name: str | None = None, *, finite: bool = True
 ) -> tuple[Any, str, str, list[str]]:
     """Turn the content of a file into a native document, not yet checked.
 
@@ -41,6 +41,8 @@ def document_from_bytes(
         Name of the file in messages.
     name : str, optional
         One of :data:`FORMATS`; by default the content decides.
+    finite : bool
+        Whether NaN in a JSON text is refused.
 
     Returns
     -------
@@ -58,7 +60,11 @@ def document_from_bytes(
         return _from_array(data, source, name)
     text = _text(data, source)
     is_json = text.lstrip().startswith(("{", "["))
-    content = parse_json(text, source) if is_json else data_from_yaml(text, source)
+    content = (
+        parse_json(text, source, finite=finite)
+        if is_json
+        else data_from_yaml(text, source)
+    )
     name = name or _format_of(content, is_json=is_json, source=source)
     if name == "isaac_grasp":
         return document_from_isaac(content, source), name, "", []
