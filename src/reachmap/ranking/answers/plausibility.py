@@ -34,6 +34,7 @@ RESOLVED: Final = 0.7
 # No arm in the field reaches beyond 5 m, and no bin is 2 mm wide.
 MILLIMETRES_FROM_M: Final = 5.0
 METRES_BELOW_M: Final = 2e-3
+# Grasps at the origin itself are in no unit.
 NOWHERE_M: Final = 1e-6
 
 
@@ -62,17 +63,15 @@ def plausibility_questions(
     """
     total, matched = len(grasps), matched_count(ranking)
     missing = total - matched
-    # A shrunk list falls onto the origin, which may lie in the map.
-    away_m = np.linalg.norm(grasps.points[np.isfinite(grasps.points[:, 0])], axis=1)
+    away_m = np.linalg.norm(grasps.points, axis=1)
+    away_m = away_m[np.isfinite(away_m)]
     far_m = float(np.median(away_m)) if len(away_m) else 0.0
+    # A list shrunk to a thousandth falls onto the origin, which may lie in the map.
     if NOWHERE_M < far_m < METRES_BELOW_M:
         grown = matched_count(rank(_scaled(grasps, 1e3)))
         if grown >= max(matched, RESOLVED * total):
-            return (
-                f"half of the points lie within {1e3 * far_m:.2g} mm of the origin; "
-                f"are these metres, not millimetres? ({grown} of {total} would be in "
-                "the map)",
-            )
+            where = f"half of the points lie within {1e3 * far_m:.2g} mm of the origin"
+            return (f"{where}; are these metres, not millimetres? ({grown} would be)",)
     if not total or missing < SOME * total:
         return ()
     what = f"{missing} of {total} grasps are nowhere near what the map knows"
