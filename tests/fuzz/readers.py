@@ -115,12 +115,16 @@ def grasps(data: bytes, folder: Path) -> None:
     """A grasp list of any format."""
     from reachmap.errors import GraspListError, SettingsError
     from reachmap.ranking.lists.reading import read_grasps
+    from reachmap.ranking.lookup.settings import Invalid
 
     path = folder / "grasps"
     path.write_bytes(data)
-    for how in ({}, {"frame": "bin"}):
+    invalid: Invalid
+    for frame, invalid in ((None, "raise"), ("bin", "raise"), ("bin", "mark")):
         try:
-            found, again = (read_grasps(path, **how) for _ in range(2))
+            found, again = (
+                read_grasps(path, frame=frame, invalid=invalid) for _ in range(2)
+            )
         except (GraspListError, SettingsError):
             continue
         for name in ("points", "directions"):
