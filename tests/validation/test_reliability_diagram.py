@@ -87,3 +87,12 @@ def test_a_changed_cell_does_not_calibrate_the_map(folder):
     result = run("validate", "bin.h5", "toy.json", "--calibrate", "--set", "seed=3")
     assert result.exit_code == 2
     assert "--calibrate: plans in the cell of the map" in result.stderr
+
+
+def test_too_few_grasps_are_refused_before_planning(folder, monkeypatch):
+    """Nobody waits for a plan to every grasp to hear that there are too few."""
+    monkeypatch.setattr("reachmap.tools.validate.plan_picks", None)
+    monkeypatch.setattr("reachmap.tools.validate.plan_picks_over_routes", None)
+    result = run("validate", "bin.h5", "--random", 49, "--calibrate", "-j", 1)
+    assert result.exit_code == 2
+    assert "needs 50 grasps or more that the map speaks about (got 49)" in result.stderr

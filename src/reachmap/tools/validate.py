@@ -32,6 +32,7 @@ from reachmap.scans.bin_scan import pairs_of_fillings
 from reachmap.tools.prologue import refuse_cell_files
 from reachmap.tools.rank import ListFormat, ranker_of, read_list
 from reachmap.validation.calibration import calibrate as fit_calibration
+from reachmap.validation.calibration import check_number
 from reachmap.validation.cycle_planning import CycleResults, plan_cycles
 from reachmap.validation.cycles import judge_cycles, settings_in_j
 from reachmap.validation.facts import facts_of
@@ -144,8 +145,6 @@ def validate(
     bin_map = read_bin_map(Path(map_path))
     context = _context(bin_map, str(map_path), pick)
     refuse_cell_files(outputs, context.loaded)
-    if calibrate:
-        _check_calibration(map_path, context, pick)
     ranker = ranker_of(bin_map, map_path, basis, calibrated=not calibrate)
     if asked.cost == "cycle":
         cycle_of(ranker.table)
@@ -156,6 +155,8 @@ def validate(
     if random is not None:
         drawn = random_grasps(bin_map, random, context.seed)
         ranked.append(rank_list(drawn, ranker, settings=settings))
+    if calibrate:
+        _check_calibration(map_path, context, pick, ranked)
     context = _with_picks(context, ranked)
     attempts = _attempts(context)
     measure = plan_picks_over_routes if attempts == "roadmap" else plan_picks
@@ -273,9 +274,12 @@ def _check_request(
 
 
 def _check_calibration(
-    map_path: str | Path, context: PickContext, pick: PickOptions
+    map_path: str | Path,
+    context: PickContext,
+    pick: PickOptions,
+    ranked: Sequence[RankedList],
 ) -> None:
-    """Refuse to calibrate with another cell than the map's."""
+    """Refuse to calibrate with another cell than the map's, or with few grasps."""
     if pick.overrides:
         raise SettingsError(
             "--calibrate: plans in the cell of the map; leave out --set"
@@ -285,6 +289,7 @@ def _check_calibration(
             f"--calibrate: {map_path} was scanned at levels of filling, and grasps are "
             "planned to in the empty bin"
         )
+    check_number(sum(int((~np.isnan(o.ranking.probability)).sum()) for o in ranked))
 
 
 def _calibrate(validation: Validation, path: Path, *, overwrite: bool) -> None:

@@ -110,11 +110,7 @@ def calibrate(
     """
     known = ~np.isnan(share)
     share, reached = share[known], reached[known]
-    if len(share) < LEAST_GRASPS:
-        raise SettingsError(
-            f"--calibrate: needs {LEAST_GRASPS} grasps or more that the map speaks "
-            f"about (got {len(share)}); add some with --random"
-        )
+    check_number(len(share))
     left_out = np.empty(len(share))
     for fold in range(FOLDS):
         out = np.arange(len(share)) % FOLDS == fold
@@ -129,6 +125,15 @@ def calibrate(
         error=reliability_diagram(left_out, reached).error,
         origin=dict(origin),
     )
+
+
+def check_number(grasps: int) -> None:
+    """Raise SettingsError where there are too few grasps that a map speaks about."""
+    if grasps < LEAST_GRASPS:
+        raise SettingsError(
+            f"--calibrate: needs {LEAST_GRASPS} grasps or more that the map speaks "
+            f"about (got {grasps}); add some with --random"
+        )
 
 
 def _curve(share: FloatArray, reached: BoolArray) -> tuple[FloatArray, FloatArray]:
