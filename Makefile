@@ -52,7 +52,7 @@ test-slow: $(VENV)/.dev ## Run the tests that take minutes
 test-lowest: $(TOOLS)/uv ## Run the default suite with the oldest dependencies that are allowed
 	$(TOOLS)/uv pip compile -q --resolution lowest-direct --only-binary :all: --extra test pyproject.toml \
 	    --python-version 3.11 -o build/lowest.txt
-	$(TOOLS)/uv venv -q --clear --python 3.11 build/lowest
+	$(TOOLS)/uv venv -q --seed --clear --python 3.11 build/lowest
 	$(TOOLS)/uv pip install -q --python build/lowest/bin/python -r build/lowest.txt
 	$(TOOLS)/uv pip install -q --python build/lowest/bin/python --no-deps --editable .
 	@# Old versions may use what newer ones of other packages call deprecated.

@@ -484,7 +484,7 @@ def test_four_axes_pick_at_the_roll_they_have(tmp_path: Path) -> None:
         # Turned by the roll that the map has, the listed orientation is the true one.
         turned = scene.kinematics.forward(q)[:3, :3]
         grid = bin_test_frames(loaded.cell, scene.T_base_bin).frames
-        listed = Rotation.from_matrix(grid.orientations[0])
+        listed = Rotation.from_matrix(grid.orientations[0].copy())
         about = np.array([0.0, 0.0, found.winning_roll[tuple(grasp)]])
         met = (listed * Rotation.from_rotvec(about)).as_matrix()
         np.testing.assert_allclose(met, turned, atol=1e-5)
