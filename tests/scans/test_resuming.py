@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import resource
+from contextlib import contextmanager
+
 import pytest
 
+from reachmap.errors import IncompleteError
 from reachmap.maps import read_bin_map, read_workspace_map
 from reachmap.runtime.journal import read_store
 from reachmap.runtime.signals import Interrupted
@@ -84,3 +88,39 @@ def test_a_bin_scan_goes_on_in_its_survey(tmp_path, monkeypatch):
         bin_scan(None, output, cell="planar-toy", overrides=SMALL)
     whole, resumed = (read_bin_map(tmp_path / name) for name in ("whole.h5", "b.h5"))
     assert resumed.stamp.content_sha256 == whole.stamp.content_sha256
+
+
+@contextmanager
+def room_for(size):
+    """Let no file grow beyond a size."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+
+
+def test_a_disk_that_fills_up_among_the_units_costs_none(tmp_path, monkeypatch):
+    """The store is named with what is safe, and the same command goes on from there."""
+    output, size = tmp_path / "b.h5", ("bin_scan.grid=[8,6]", *SMALL[1:])
+    bin_scan(None, tmp_path / "whole.h5", cell="planar-toy", overrides=size)
+    with monkeypatch.context() as change:
+        change.setattr(
+            planning, "plan_grasps", interrupt_after(planning.plan_grasps, 1)
+        )
+        with pytest.raises(Interrupted, match="1 of 5 units"):
+            bin_scan(None, output, cell="planar-toy", overrides=size)
+    line = len(store_path(output).read_bytes().rstrip().splitlines()[-1])
+    limit = store_path(output).stat().st_size + 5 * line // 2
+    said = (
+        "File too large; [234] of 5 units and 2 before are safe there; free some space"
+    )
+    with room_for(limit), pytest.raises(IncompleteError, match=said) as caught:
+        bin_scan(None, output, cell="planar-toy", overrides=size)
+    assert str(store_path(output)) in str(caught.value)
+    assert not output.exists()
+    bin_scan(None, output, cell="planar-toy", overrides=size)
+    whole, resumed = (read_bin_map(tmp_path / name) for name in ("whole.h5", "b.h5"))
+    assert resumed.stamp.content_sha256 == whole.stamp.content_sha256
+    assert sorted(tmp_path.iterdir()) == [output, tmp_path / "whole.h5"]
