@@ -33,7 +33,8 @@ WRITERS = [
     ("place-bin workspace.h5 -j 1 -o {o}", ["workspace.h5"]),
     ("place-bin workspace.png -j 1 -o p.h5 --picture {o}", ["workspace.png"]),
     ("rank g.json --map bin.h5 -o {o}", ["g.json", "bin.h5"]),
-    ("rank g.json --map bin.h5 --cell cell.yaml -o {o}", ["cell.yaml"]),
+    ("rank g.json --map bin.h5 --cell cell.yaml -o {o}", ["cell.yaml", "arm.urdf"]),
+    ("rank g.json --map bin.h5 -o {o}", ["bin.calibration.json"]),
     ("rank g.json --map bin.png --chart {o}", ["bin.png"]),
     ("validate bin.h5 g.json -j 1 -o {o}", ["bin.h5", "g.json"]),
     ("validate bin.png g.json -j 1 --chart {o}", ["bin.png"]),
@@ -42,6 +43,14 @@ WRITERS = [
     ("new-cell arm.urdf -o {o}", ["arm.urdf"]),
     ("view bin.h5 --html {o}", ["bin.h5"]),
     ("view cell.yaml --html {o}", ["cell.yaml", "arm.urdf"]),
+    ("study cell.yaml --vary robot.urdf=arm.urdf,b.urdf -j 1 -o {o}", ["b.urdf"]),
+    ("study cell.yaml --vary bin_scan.repeats=1,2 -j 1 -o {o}", ["cell.yaml"]),
+    ("place-robot cell.yaml -j 1 -o {o}", ["cell.yaml", "arm.urdf"]),
+    ("place-robot cell.yaml --arm b.yaml -j 1 -o {o}", ["b.yaml", "b.urdf"]),
+    ("robust bin.h5 --bin 5mm -j 1 -o {o}", ["bin.h5"]),
+    ("robust bin.png --bin 5mm -j 1 -o r.h5 --picture {o}", ["bin.png"]),
+    ("empty bin.h5 --part 60x40x20mm -o {o}", ["bin.h5"]),
+    ("export bin.h5 --all -o {o}", ["bin.h5"]),
     ("merge a.journal b.journal -o {o}", ["a.journal", "b.journal"]),
     ("compare bin.png bin.h5 --picture {o}", ["bin.png"]),
 ]
@@ -58,8 +67,11 @@ def maps(tmp_path_factory: pytest.TempPathFactory) -> Path:
     urdf = "planar-toy/planar_arm.urdf"
     assert urdf in CELL
     (folder / "cell.yaml").write_text(CELL.replace(urdf, "arm.urdf"))
-    (folder / "arm.urdf").write_text(URDF)
-    for name in ("g.json", "ranked.json", "a.journal", "b.journal"):
+    for name in ("arm.urdf", "b.urdf"):
+        (folder / name).write_text(URDF)
+    (folder / "b.yaml").write_text("robot: {urdf: b.urdf}\n")
+    lists = ("g.json", "ranked.json", "a.journal", "b.journal", "bin.calibration.json")
+    for name in lists:
         (folder / name).write_text(GRASPS)
     return folder
 

@@ -108,6 +108,16 @@ def factors_of(
     return factors
 
 
+def choices_of(factors: Sequence[Factor]) -> list[str]:
+    """Each value that is no number, as an override: files are among them."""
+    return [
+        f"{factor.key}={text}"
+        for factor in factors
+        if factor.unit == CHOICE
+        for text in factor.texts
+    ]
+
+
 def _factor(text: str, base: LoadedCell, sampled: bool) -> Factor:
     name, equals, values = (part.strip() for part in text.partition("="))
     if not equals or not name or not values:

@@ -116,7 +116,7 @@ def place_bins(
         )
         for name in names
     }
-    refuse_cell_files([*files.values(), *pictures.values()], cells[names[0]])
+    refuse_cell_files([*files.values(), *pictures.values()], *cells.values())
     found = _best_order(cells, workspace_map, choice, run)
     for name in names:
         write_placement(files[name], found[name].placement, overwrite=run.overwrite)

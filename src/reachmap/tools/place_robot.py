@@ -127,7 +127,7 @@ def place_robot(
     clock = RunClock(workers=run.workers)
     overrides = with_seed(overrides, seed)
     cells = _cells(cell, overrides, choice)
-    refuse_cell_files([output, picture], cells[0])
+    refuse_cell_files([output, picture], *cells)
     names = (choice.rail,) if choice.rail else choice.mountings or (AS_IT_IS,)
     with clock.phase("decide"):
         searches = [

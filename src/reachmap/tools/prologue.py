@@ -43,8 +43,8 @@ def path_of_cell(name_or_path: str | None) -> Path | None:
     return None
 
 
-def refuse_cell_files(outputs: Iterable[Path | None], loaded: LoadedCell) -> None:
-    """Refuse outputs that would replace what a cell is made from.
+def refuse_cell_files(outputs: Iterable[Path | None], *cells: LoadedCell) -> None:
+    """Refuse outputs that would replace what cells are made from.
 
     Raises
     ------
@@ -53,7 +53,8 @@ def refuse_cell_files(outputs: Iterable[Path | None], loaded: LoadedCell) -> Non
     """
     for output in outputs:
         if output is not None and is_there(real_path(output)):
-            check_output(output, overwrite=True, inputs=_files_of(loaded))
+            for loaded in cells:
+                check_output(output, overwrite=True, inputs=_files_of(loaded))
 
 
 def _files_of(loaded: LoadedCell) -> Iterator[Path]:

@@ -24,7 +24,7 @@ from reachmap.ranking.answers.ranked_list import (
 )
 from reachmap.ranking.lists.arrays import GraspList
 from reachmap.ranking.lists.reading import STDIN, read_grasps
-from reachmap.ranking.lookup.calibration import usual_calibration
+from reachmap.ranking.lookup.calibration import calibration_beside, usual_calibration
 from reachmap.ranking.lookup.ranker import Ranker
 from reachmap.ranking.lookup.settings import CostBasis, Invalid, RankSettings
 
@@ -153,12 +153,14 @@ def rank(
     check_picture(chart, "--chart")
     targets = targets_of(sources, output)
     # A cell is a name or a file; either way it is not to be replaced.
-    inputs = [map_path, cell, *(source for source in sources if source != STDIN)]
+    inputs = [map_path, calibration_beside(map_path), cell]
+    inputs += [source for source in sources if source != STDIN]
     check_outputs([*targets, chart], overwrite=overwrite, inputs=inputs)
     lists = [read_list(source, list_format) for source in sources]
     bin_map = read_bin_map(Path(map_path))
     if cell is not None:
-        _check_cell(bin_map, map_path, cell, overrides, force=force)
+        outputs = [*targets, chart]
+        _check_cell(bin_map, map_path, cell, overrides, outputs, force=force)
     ranker = ranker_of(bin_map, map_path, basis)
     ranked = [_rank_one(grasps, ranker, settings, list_format) for grasps in lists]
     story = ""
@@ -222,14 +224,19 @@ def _check_cell(
     map_path: str | Path,
     cell: str,
     overrides: Sequence[str],
+    outputs: Sequence[Path | None],
     *,
     force: bool,
 ) -> None:
+    """Refuse a map of another cell, and to replace what the cell is made from."""
     # Imported here: reading cells takes longer than ranking.
     from reachmap.cell.loading import read_cell
     from reachmap.ranking.answers.cell_check import differing_sections
+    from reachmap.tools.prologue import refuse_cell_files
 
-    different = differing_sections(bin_map, read_cell(cell, overrides))
+    loaded = read_cell(cell, overrides)
+    refuse_cell_files(outputs, loaded)
+    different = differing_sections(bin_map, loaded)
     if not different:
         return
     message = f"{map_path}: was made for another cell than {cell}"

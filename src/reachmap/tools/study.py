@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import re
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -23,6 +24,7 @@ from reachmap.studies.design import (
     Factor,
     Variant,
     base_of,
+    choices_of,
     factors_of,
     grid,
     latin_hypercube,
@@ -117,6 +119,9 @@ def study(
     )
     if not factors:
         raise SettingsError("nothing to vary: give --vary NAME=LOW:HIGH:N")
+    for change in choices_of(factors):
+        with suppress(CellError):  # of that variant, which gets a row with its cause
+            refuse_cell_files([output], read_cell(cell, [*overrides, change]))
     settings = {
         "vary": list(vary),
         "samples": samples,
