@@ -23,7 +23,7 @@ def table_lines(rows: Sequence[Sequence[str]], align: str) -> list[str]:
       z     percent
       +0.1     53.5
     """
-    widths = [max(len(row[k]) for row in rows) for k in range(len(align))]
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     return [
         "  "
         + "  ".join(

@@ -5,17 +5,21 @@ from __future__ import annotations
 import resource
 from contextlib import contextmanager
 
+import numpy as np
 import pytest
 
+from reachmap.cli.text.info import info_text
 from reachmap.errors import IncompleteError
-from reachmap.maps import read_bin_map, read_workspace_map
+from reachmap.maps import BinMap, Status, read_bin_map, read_workspace_map
 from reachmap.runtime.journal import read_store
 from reachmap.runtime.signals import Interrupted
 from reachmap.runtime.store import store_path
 from reachmap.scans import bin_roadmap, ik_survey, workspace_roadmap
 from reachmap.scans import bin_scan as planning
 from reachmap.tools.bin_scan import bin_scan
+from reachmap.tools.info import info
 from reachmap.tools.workspace_scan import workspace_scan
+from tests.scans.test_cycle_toy import TOY
 
 SMALL = ("bin_scan.grid=[3,3]", "bin_scan.repeats=1")
 
@@ -88,6 +92,43 @@ def test_a_bin_scan_goes_on_in_its_survey(tmp_path, monkeypatch):
         bin_scan(None, output, cell="planar-toy", overrides=SMALL)
     whole, resumed = (read_bin_map(tmp_path / name) for name in ("whole.h5", "b.h5"))
     assert resumed.stamp.content_sha256 == whole.stamp.content_sha256
+
+
+def fail_at(function, count):
+    """A defect that shows in the call of that number."""
+    calls = []
+
+    def call(*arguments, **settings):
+        calls.append(1)
+        if len(calls) == count:
+            raise ZeroDivisionError("a defect")
+        return function(*arguments, **settings)
+
+    return call
+
+
+@pytest.mark.parametrize("cell", [(), TOY], ids=["no part", "part"])
+def test_a_unit_that_was_given_up_is_an_error_in_its_map(tmp_path, monkeypatch, cell):
+    """All others are there, as in the journal; the same command completes the map."""
+    output, cell = tmp_path / "b.h5", (*cell, "bin_scan.repeats=1")
+    bin_scan(None, tmp_path / "whole.h5", cell="planar-toy", overrides=cell)
+    whole = read_bin_map(tmp_path / "whole.h5")
+    with monkeypatch.context() as change:
+        change.setattr(planning, "GRASPS_PER_UNIT", 10)
+        change.setattr(planning, "plan_grasps", fail_at(planning.plan_grasps, 2))
+        with pytest.raises(IncompleteError, match=r"1 of [28] units"):
+            bin_scan(None, output, cell="planar-toy", overrides=cell)
+        part, lost = read_bin_map(output), np.zeros(whole.status.shape, bool)
+        lost.flat[10:20] = True
+        assert (part.status[lost] == Status.ERROR).all()
+        np.testing.assert_array_equal(part.status[~lost], whole.status[~lost])
+        for place in (output, store_path(output)):
+            found = info(place)
+            assert isinstance(found.record, BinMap)
+            np.testing.assert_array_equal(found.record.status, part.status)
+            assert "error" in info_text(found)
+        bin_scan(None, output, cell="planar-toy", overrides=cell)
+    assert read_bin_map(output).stamp.content_sha256 == whole.stamp.content_sha256
 
 
 @contextmanager

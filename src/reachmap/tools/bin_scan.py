@@ -225,7 +225,7 @@ def estimate_bin_scan(
 
 
 def _settings(scene: Scene) -> dict[str, Any]:
-    cell = scene.loaded.cell
+    cell, stages = scene.loaded.cell, stages_of(scene.loaded)
     return {
         **checking_settings(scene),
         "planner": cell.planner.model_dump(mode="json"),
@@ -236,5 +236,5 @@ def _settings(scene: Scene) -> dict[str, Any]:
         "fill_m": list(cell.bin_scan.layers) if cell.bin_scan.is_filled else None,
         "press_in_m": cell.bin_scan.press_in_m if cell.bin_scan.is_filled else None,
         "approach_distance_m": approach_distance_m(cell),
-        **({"cycle_stages": list(stages_of(scene.loaded))} if cell.held() else {}),
+        **({"cycle_stages": list(stages)} if stages else {}),
     }

@@ -128,3 +128,17 @@ def test_cycles_are_told_drawn_and_reported():
     assert summarise_cycle(plain) is None
     assert cycle_lines(None) == []
     assert cycle_blocks(plain) is None
+
+
+def test_a_map_without_a_whole_cycle_is_told_drawn_and_reported():
+    """Its cycles all end early; nothing is left to take a mean of."""
+    record = with_cycles()
+    assert record.cycle is not None
+    none = np.full_like(record.cycle.cycle_time, np.nan)
+    cycle = dataclasses.replace(record.cycle, cycle_time=none)
+    record = dataclasses.replace(record, cycle=cycle)
+    found = summarise_cycle(record)
+    assert "Whole cycles: 0 of " in "\n".join(cycle_lines(found))
+    assert len(draw_cycle(record).axes) >= 3
+    assert cycle_blocks(record) is not None
+    assert headline_answers(RunFolder(name="run", bin_map=record))

@@ -21,7 +21,9 @@ LIFT, TRANSFER, PLACE, _, RETURN = range(len(STAGES))
 
 
 def stages_of(loaded: LoadedCell) -> tuple[str, ...]:
-    """Stages after the grasp; the lift alone where the part goes nowhere."""
+    """Stages after the grasp; none without a part, a lift if it goes nowhere."""
+    if loaded.cell.held() is None:
+        return ()
     return STAGES if loaded.cell.drop_offs else STAGES[:1]
 
 
