@@ -5,7 +5,11 @@ it (``name:=value``, ``--tip LINK``, ``--package NAME=FOLDER``). For each: new-c
 check, inverse kinematics at random configurations, a reduced workspace scan, a reduced
 bin scan, rank. A robot that cannot be used is one line of the table with the reason.
 
-    python benchmarks/published_robots.py robots.txt --only ur --keep /tmp/cells
+    python benchmarks/published_robots.py robots.txt --only ur --keep /tmp/cells > rows
+    python benchmarks/published_robots.py --table rows
+
+Each row holds the exit code of every command, what stderr said about a share of 0 %,
+how the arm's inverse kinematics work and the seconds of CPU time.
 """
 
 from __future__ import annotations
@@ -13,11 +17,13 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import resource
 import shlex
 import subprocess
 import sys
 import tempfile
 import time
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
@@ -54,22 +60,32 @@ GRASPS = {
 }
 
 
+CPU_S = 300  # of one command: the slowest of those tried needs a third
+
+
 class StepError(Exception):
     """A step that ended with another code than 0; the text is what it said."""
 
 
-def run(*arguments: str, folder: Path) -> str:
-    """Answer of a command of the tool, with one worker and no progress."""
+def run(*arguments: str, folder: Path, row: dict[str, object]) -> str:
+    """Answer of a command of the tool; its exit code and complaints go into the row."""
+    step = row["step"] = arguments[0]
     done = subprocess.run(
         [str(Path(sys.executable).with_name("reachmap")), *arguments],
         cwd=folder,
         capture_output=True,
         text=True,
         check=False,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_CPU, (CPU_S, CPU_S)),
     )
+    codes = row.setdefault("exit", {})
+    assert isinstance(codes, dict)
+    codes[step] = done.returncode
+    said = [line for line in done.stderr.splitlines() if line.strip()]
     if done.returncode != 0:
-        said = [line for line in done.stderr.splitlines() if line.strip()]
-        raise StepError(f"exit {done.returncode}: {said[0] if said else '(nothing)'}")
+        raise StepError(" ".join(said[:3]) or "(nothing)")
+    if any("0 %" in line for line in said):
+        row[f"{step} said"] = said
     return done.stdout
 
 
@@ -93,39 +109,22 @@ def solved(cell: Path, count: int) -> tuple[str, bool, int]:
 def chain(line: str, folder: Path, count: int, *, scans: bool) -> dict[str, object]:
     """Row of the table for one robot."""
     row: dict[str, object] = {"robot": line}
-    quiet = ["--no-progress", "-j", "1"]
     began = time.process_time() + sum(os.times()[2:4])
     try:
         words = [
             str(Path(word).absolute()) if Path(word).exists() else word
             for word in shlex.split(line)
         ]
-        row["step"] = "new-cell"
-        made = json.loads(run("new-cell", *words, "--json", folder=folder))
+        answer = run("new-cell", *words, "--json", folder=folder, row=row)
+        made = json.loads(answer)
         row |= {"joints": len(made["joints"]), "tip": made["tip"]}
         row |= {"axis": made["approach_axis"], "notes": made["notes"]}
-        row["step"] = "check"
-        run("check", "cell.yaml", "--json", folder=folder)
+        run("check", "cell.yaml", "--json", folder=folder, row=row)
         row["step"] = "ik"
         method, complete, found = solved(folder / "cell.yaml", count)
         row |= {"ik": method, "complete": complete, "solved": f"{found}/{count}"}
-        if not scans:
-            row["step"] = "done"
-            return row
-        cone = ORIENTATIONS if len(made["joints"]) >= FULL_AXES else ()
-        sets = [word for setting in (*SETTINGS, *cone) for word in ("--set", setting)]
-        row["step"] = "workspace-scan"
-        answer = run("workspace-scan", "cell.yaml", *sets, *quiet, "--json",
-                     folder=folder)  # fmt: skip
-        row["workspace"] = json.loads(answer)
-        row["step"] = "bin-scan"
-        answer = run("bin-scan", "--cell", "cell.yaml", *sets, *quiet, "--json",
-                     folder=folder)  # fmt: skip
-        row["bin"] = json.loads(answer)
-        row["step"] = "rank"
-        (folder / "grasps.json").write_text(json.dumps(GRASPS))
-        ranked = json.loads(run("rank", "grasps.json", folder=folder))
-        row["ranked"] = len(ranked["grasps"])
+        if scans:
+            reduced_scans(folder, row)
         row["step"] = "done"
     except (StepError, ReachmapError) as error:
         row["why"] = str(error).splitlines()[0]
@@ -134,15 +133,66 @@ def chain(line: str, folder: Path, count: int, *, scans: bool) -> dict[str, obje
     return row
 
 
+def reduced_scans(folder: Path, row: dict[str, object]) -> None:
+    """Workspace scan, bin scan and ranking of the cell in a folder."""
+    joints = row["joints"]
+    assert isinstance(joints, int)
+    cone = ORIENTATIONS if joints >= FULL_AXES else ()
+    words = [word for setting in (*SETTINGS, *cone) for word in ("--set", setting)]
+    words += ["--no-progress", "-j", "1", "--json"]
+    answer = run("workspace-scan", "cell.yaml", *words, folder=folder, row=row)
+    row["workspace"] = json.loads(answer)
+    answer = run("bin-scan", "--cell", "cell.yaml", *words, folder=folder, row=row)
+    row["bin"] = json.loads(answer)
+    (folder / "grasps.json").write_text(json.dumps(GRASPS))
+    ranked = json.loads(run("rank", "grasps.json", folder=folder, row=row))
+    row["ranked"] = len(ranked["grasps"])
+
+
+def outcome(row: dict[str, object]) -> str:
+    """How a robot went: through, nothing reached and why, refused, or wrong."""
+    if row["step"] == "done":
+        share = dict(row.get("bin") or {}).get("path_reachability_percent")
+        if share != 0.0:
+            return "through"
+        return "0 % with a reason" if "bin-scan said" in row else "0 % IN SILENCE"
+    codes = row["exit"]
+    assert isinstance(codes, dict)
+    return "refused" if codes.get(str(row["step"])) == 2 else "FAILED"
+
+
+def table(rows: list[dict[str, object]]) -> str:
+    """Rows as a table in Markdown, and how many went which way."""
+    lines = [
+        "| robot | axes | tip | IK | complete | solved | bin % | CPU s | outcome |"
+    ]
+    lines.append("|---" * 9 + "|")
+    for row in rows:
+        robot = " ".join(word.rpartition("/")[2] for word in str(row["robot"]).split())
+        share = dict(row.get("bin") or {}).get("path_reachability_percent", "")
+        cells = [robot, row.get("joints"), row.get("tip"), row.get("ik")]
+        cells += [row.get("complete"), row.get("solved"), share, row["cpu_s"]]
+        cells.append(f"{outcome(row)}: {row['why']}" if "why" in row else outcome(row))
+        lines.append("| " + " | ".join(str(cell) for cell in cells) + " |")
+    counts = Counter(outcome(row) for row in rows)
+    lines += ["", ", ".join(f"{n} {how}" for how, n in counts.most_common())]
+    return "\n".join(lines)
+
+
 def main() -> None:
     """Print a row of JSON for each robot, and how many went through."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("robots", type=Path, help="list, one robot a line")
+    parser.add_argument("--table", action="store_true", help="show rows made before")
     parser.add_argument("--only", default="", help="lines that contain this text")
     parser.add_argument("--count", type=int, default=200, help="random configurations")
     parser.add_argument("--keep", type=Path, help="folder to keep the cells in")
     parser.add_argument("--no-scans", action="store_true", help="up to check and IK")
     options = parser.parse_args()
+    if options.table:
+        text = options.robots.read_text()
+        print(table([json.loads(line) for line in text.splitlines()]))
+        return
     lines = [line.strip() for line in options.robots.read_text().splitlines()]
     through = tried = 0
     for number, line in enumerate(lines):

@@ -281,20 +281,21 @@ def _part_warnings(document: Document, cell: Cell, files: CellFiles) -> list[str
 def _links_unchecked(
     document: Document, cell: Cell, robot: UrdfDescription
 ) -> list[str]:
-    """Name links that can be seen and have no collision shape."""
+    """Name links that can be seen and have no collision shape, or an arm of none."""
     unseen = robot.links_without_collision
-    if not unseen:
-        return []
     shown = ", ".join(unseen[:12]) + (", …" if len(unseen) > 12 else "")
     location = ("robot", "urdf")
     still = {*WORLD, *robot.fixed_to(robot.root)}
     carried = {*(c.link for c in robot.collisions), *(b.attach_to for b in cell.bodies)}
-    if carried <= still and not still.issuperset(unseen):
+    if carried <= still:
+        visual = f" ({shown}: <visual> only)" if unseen else ""
         return [
             f"{document.place(location)}: NOTHING OF THE ARM IS CHECKED for collision: "
-            f"no link that moves has a <collision> element ({shown}: <visual> only); "
+            f"no link that moves has a <collision> element{visual}; "
             "add such elements, or bodies attached to the links"
         ]
+    if not unseen:
+        return []
     return [
         f"{document.place(location)}: no <collision> element, so never checked: {shown}"
     ]

@@ -72,7 +72,11 @@ def resolved_cell(
     _write_out_srdf(document, data, files)
     if files.robot is not None:
         moving = moving_joints(data, files.robot, files.srdf_description)
-        tighten_limits(robot["limits"], files.joint_limits, files.robot, moving)
+        for problem in tighten_limits(
+            robot["limits"], files.joint_limits, files.robot, moving
+        ):
+            document.add(("robot", "joint_limits"), problem)
+        document.raise_mistakes()
         robot["joint_limits"] = None
         write_out_base_pose(document, data, files.robot)
     try:

@@ -10,8 +10,15 @@ import numpy as np
 
 from reachmap._typing import BoolArray, FloatArray, IntArray
 from reachmap.core.collision.bin_fit import BinFit
+from reachmap.core.collision.solids import SolidCell
 from reachmap.core.scene import Scene
-from reachmap.geometry import AXES, transform_from_parts, yaw_transform
+from reachmap.geometry import (
+    AXES,
+    axis_vector,
+    inverse_transform,
+    transform_from_parts,
+    yaw_transform,
+)
 from reachmap.maps.records import NO_PAIR, Status
 from reachmap.maps.summary.nothing import likeliest_cause
 from reachmap.sampling.frames import FrameGrid, approach_distance_m, bin_test_frames
@@ -22,6 +29,8 @@ from reachmap.tools.trial import reach_of
 ENOUGH = 0.4
 # Tools that are tried, in depths of the bin: a flange has to stay above the rim.
 TOOLS = (0.0, 0.5, 1.0, 2.0, 3.0)
+# What protrudes less from the tip belongs to a flange rather than to a tool [m].
+FLANGE_M = 0.02
 # A longer tool is as unusual as this many other places are.
 PLACES_PER_TOOL = 3
 # So many pairs of both are looked at before the best of them is taken.
@@ -31,6 +40,10 @@ LOW = 0.1
 THIN = 3
 # As a share of the reach: the size of a bin, and of the gaps between random poses.
 NEAR = 0.35
+# A tool points down up to 60 degrees. Places that are near such poses in less than this
+# share of the cases of the best one are passed over: an arm that hangs from a shoulder
+# is hardly ever so in front of it (0.04), one on a pedestal often (0.5 and more).
+DOWN, FEW = 0.5, 0.4
 POINTS = np.array([[0.0, 0.0], [-0.3, -0.3], [0.3, -0.3], [-0.3, 0.3], [0.3, 0.3]])
 
 
@@ -47,10 +60,13 @@ class BinGuess:
     yaw_deg : float
     tool_m : float
         From the tip to the TCP along the approach axis.
+    carried_m : float
+        From the tip to the end of what the URDF has there; 0 for a flange.
     share : float
         Of a few test grasps, those that a free configuration meets.
     why : str
-        Why none of them is met at the usual place without a tool; "" if one is.
+        Why none of them is met at the usual place with the TCP at the end of what the
+        URDF has; "" if one is.
     odd_place : bool
         Whether that is not the usual place.
     avoided : str
@@ -60,6 +76,7 @@ class BinGuess:
     xyz_m: Place
     yaw_deg: float
     tool_m: float
+    carried_m: float
     share: float
     why: str
     odd_place: bool
@@ -80,13 +97,17 @@ def guess_bin(
     scene : Scene
         Built with ``bin_moves``, its TCP at the tip; not to be used any more.
     T_base_tcp : array, shape (n, 4, 4)
-        Poses of random configurations. Places that none of them comes near with its
+        Poses of random configurations. Places that few of them come near with the
         tool pointing down are passed over.
     with_tool : bool
         Whether the TCP may be put beyond the tip, as if on a tool.
     """
+    carried_m = _carried_m(scene) if with_tool else 0.0
     places = list(_places(T_base_tcp[:, :3, 3]))
-    near = [place for place in places if _comes_near(scene, T_base_tcp, place[0])]
+    T = T_base_tcp @ _along(scene, carried_m)
+    counts = np.array([_near_poses(scene, T, xyz_m) for xyz_m, _ in places])
+    fewest = max(1, FEW * counts.max())
+    near = [place for place, n in zip(places, counts, strict=True) if n >= fewest]
     trials, avoided = _clear(scene, near)
     if not trials:
         trials, avoided = _clear(scene, places)
@@ -94,15 +115,17 @@ def guess_bin(
     best: BinGuess | None = None
     why = ""
     for place, depths in sorted(pairs, key=_oddness)[:MOST]:
-        trial, tool_m = trials[place], depths * scene.loaded.cell.bin.inner[2]
+        trial = trials[place]
+        tool_m = carried_m + depths * scene.loaded.cell.bin.inner[2]
         share = trial.share(tool_m)
         if best is None:
-            why = "" if share else trial.why_nothing()
+            why = "" if share else trial.why_nothing(tool_m)
         if best is None or share > best.share:
             best = BinGuess(
                 xyz_m=trial.xyz_m,
                 yaw_deg=trial.yaw_deg,
                 tool_m=round(tool_m, 3),
+                carried_m=carried_m,
                 share=share,
                 why=why,
                 odd_place=place > 0 or bool(avoided),
@@ -123,15 +146,36 @@ def guess_notes(guess: BinGuess, tip: str) -> list[str]:
     few = "few grasps are met"
     if guess.odd_place:
         where = ", ".join(f"{value:g}" for value in guess.xyz_m)
-        why = few if guess.tool_m else guess.why or few
+        why = few if guess.tool_m > guess.carried_m else guess.why or few
         reason = f"it would meet {guess.avoided}" if guess.avoided else why
         notes.append(f"the bin stands at ({where}): in front of the base {reason}")
-    if guess.tool_m:
+    if guess.tool_m > guess.carried_m:
+        where = f"the end of what the URDF has there ({guess.carried_m:g} m)"
         notes.append(
-            f"robot.tcp is {guess.tool_m:g} m beyond {tip}, as if on a tool: at {tip} "
-            f"itself {guess.why or few}"
+            f"robot.tcp is {guess.tool_m:g} m beyond {tip}, as if on a tool: at "
+            f"{where if guess.carried_m else f'{tip} itself'} {guess.why or few}"
+        )
+    elif guess.tool_m:
+        notes.append(
+            f"robot.tcp is {guess.tool_m:g} m beyond {tip}, at the end of what the "
+            "URDF has there"
         )
     return notes
+
+
+def _carried_m(scene: Scene) -> float:
+    """From the TCP along its approach axis to the end of what moves with it [m]."""
+    cell = SolidCell.build(scene.loaded)
+    robot = cell.robot
+    direction = axis_vector(scene.loaded.cell.robot.tcp.approach_axis)
+    ends = []
+    for solid in cell.solids:
+        if solid.joint == robot.tcp_joint and len(solid.vertices):
+            T_tcp_solid = inverse_transform(robot.T_joint_tcp) @ solid.T_joint_solid
+            along_m = solid.vertices @ T_tcp_solid[:3, :3].T @ direction
+            ends.append(float(along_m.max() + T_tcp_solid[:3, 3] @ direction))
+    farthest_m = max(ends, default=0.0)
+    return round(farthest_m, 3) if farthest_m > FLANGE_M else 0.0
 
 
 def _oddness(pair: tuple[int, float]) -> float:
@@ -176,7 +220,6 @@ class _Trial:
         part = min(THIN, T.shape[1])
         self._T = T[(k + k // part + point) % part == 0]
         self._approach_m = approach_distance_m(cell)
-        self._axis, self._sign = AXES[cell.robot.tcp.approach_axis]
 
     def _scene(self) -> Scene:
         """The scene with its bin here."""
@@ -186,14 +229,14 @@ class _Trial:
     def share(self, tool_m: float) -> float:
         """Share of the grasps that are free, and free where their approach begins."""
         scene = self._scene()
-        met = _free(scene, self._T @ self._along(-tool_m))
-        T = self._T[met] @ self._along(-tool_m - self._approach_m)
+        met = _free(scene, self._T @ _along(scene, -tool_m))
+        T = self._T[met] @ _along(scene, -tool_m - self._approach_m)
         return float(_free(scene, T).sum() / len(self._T))
 
-    def why_nothing(self) -> str:
-        """Likeliest cause why nothing is met without a tool."""
+    def why_nothing(self, tool_m: float) -> str:
+        """Likeliest cause why nothing is met with a tool."""
         scene = self._scene()
-        Q, frame, free = _solutions(scene, self._T)
+        Q, frame, free = _solutions(scene, self._T @ _along(scene, -tool_m))
         status = np.full(len(self._T), Status.NO_IK, np.uint8)
         status[frame] = Status.IK_IN_COLLISION
         status[frame[free]] = Status.APPROACH_BLOCKED
@@ -204,11 +247,11 @@ class _Trial:
                 pair[k] = scene.checker.touching_pairs(Q[row])[0]
         return likeliest_cause(status, pair, scene.checker.body_pairs)
 
-    def _along(self, distance_m: float) -> FloatArray:
-        """T_tcp_moved: from the TCP along its approach axis."""
-        p = np.zeros(3)
-        p[self._axis] = self._sign * distance_m
-        return transform_from_parts(np.eye(3), p)
+
+def _along(scene: Scene, distance_m: float) -> FloatArray:
+    """T_tcp_moved: from the TCP along its approach axis."""
+    direction = axis_vector(scene.loaded.cell.robot.tcp.approach_axis)
+    return transform_from_parts(np.eye(3), distance_m * direction)
 
 
 def _solutions(
@@ -227,12 +270,12 @@ def _free(scene: Scene, T_base_tip: FloatArray) -> BoolArray:
     return np.isin(np.arange(len(T_base_tip)), frame[free])
 
 
-def _comes_near(scene: Scene, T_base_tcp: FloatArray, xyz_m: Place) -> bool:
-    """Whether some pose is near a place and points down rather than up."""
+def _near_poses(scene: Scene, T_base_tcp: FloatArray, xyz_m: Place) -> int:
+    """Number of poses that are near a place with the tool pointing down."""
     axis, sign = AXES[scene.loaded.cell.robot.tcp.approach_axis]
     apart_m = np.linalg.norm(T_base_tcp[:, :3, 3] - xyz_m, axis=1)
     near = apart_m < NEAR * reach_of(T_base_tcp[:, :3, 3])
-    return bool((near & (-sign * T_base_tcp[:, 2, axis] > 0.0)).any())
+    return int((near & (-sign * T_base_tcp[:, 2, axis] > DOWN)).sum())
 
 
 def _places(points: FloatArray) -> Iterator[tuple[Place, float]]:

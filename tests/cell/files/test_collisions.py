@@ -95,6 +95,14 @@ def test_links_that_can_be_seen_but_not_collide_are_named(tmp_path: Path) -> Non
     assert "never checked: l2" in warning
 
 
+def test_an_arm_without_shapes_of_any_kind_is_told(tmp_path: Path) -> None:
+    """Flat URDFs of kinematics alone have neither visuals nor collisions."""
+    bare = robot(*ARM, link("l1"))
+    (warning,) = load(tmp_path, bare, "l1", ["j1"]).warnings
+    assert "NOTHING OF THE ARM IS CHECKED" in warning
+    assert "<visual>" not in warning
+
+
 @pytest.mark.parametrize("axis", ["0 0 0", "1e308 0 0", "0 1e-320 0", "1e200 1e200 1"])
 def test_axes_that_are_no_directions_are_refused(axis: str) -> None:
     """Engines divide by their length."""

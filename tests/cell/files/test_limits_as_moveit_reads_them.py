@@ -148,6 +148,28 @@ def test_what_a_joint_limits_file_says_in_vain_is_said(tmp_path: Path) -> None:
     assert "limits.yaml:4:3: not joints of the robot, passed over: ur_j1" in names
 
 
+def test_keys_that_are_not_read_are_named(tmp_path: Path) -> None:
+    """Each once, at its first place; those that no map depends on are not."""
+    text = (
+        "joint_limits:\n"
+        "  j1: {max_velocities: 1, has_effort_limits: yes, angle_wraparound: true}\n"
+        "  j2: {max_velocities: 1, soft_upper_limit: 1}\n"
+    )
+    urdf = robot(link("base"), link("l1", BOX), joint("j1", "base", "l1"),
+                 link("l2", BOX), joint("j2", "l1", "l2"))  # fmt: skip
+    given = [limits(tmp_path, text)]
+    typo, soft = load(tmp_path, urdf, "l2", ["j1", "j2"], given).warnings
+    assert "limits.yaml:2:8: max_velocities is not read; did you mean 'max_v" in typo
+    assert "limits.yaml:3:27: soft_upper_limit is not read" in soft
+
+
+def test_a_range_that_the_file_leaves_empty_names_the_joint(tmp_path: Path) -> None:
+    """The URDF ends at 3 rad, before the file's range begins."""
+    given = limits(tmp_path, "joint_limits: {j1: {min_position: 4}}")
+    with pytest.raises(CellError, match=r"robot\.joint_limits: joint 'j1': no range"):
+        arm(tmp_path, given)
+
+
 @pytest.mark.parametrize("scaling", [0.5, 0.1])
 @pytest.mark.parametrize("distance", [0.01, 2.5])
 def test_scaling_is_the_speed_slider(

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from reachmap.cell.files.urdf import UrdfDescription, UrdfJoint, full_turn
+from reachmap.cell.text.messages import did_you_mean
 from reachmap.cell.text.yaml_reader import Document, parse_yaml
 from reachmap.errors import CellError
 
@@ -21,6 +22,15 @@ _RATES = (
     ("acceleration_rad_s2", "acceleration"),
     ("jerk_rad_s3", "jerk"),
 )
+_READ = {
+    "position": ("min_position", "max_position"),
+    **{kind: (f"max_{kind}",) for _, kind in _RATES},
+}
+_KEYS = tuple(
+    key for kind, keys in _READ.items() for key in (f"has_{kind}_limits", *keys)
+)
+# Say nothing that a map depends on.
+_NEEDLESS = ("has_effort_limits", "max_effort", "angle_wraparound")
 _LARGEST = 1e6
 _TAGS = {"!degrees": math.radians, "!radians": float}
 # As yaml-cpp and rospy read them; YAML 1.2 knows only true and false.
@@ -65,7 +75,7 @@ def parse_joint_limits(
         raise CellError(f"{place}: expected a mapping joint_limits: {{joint: {{…}}}}")
     limits = {name: _one(document, name, entry) for name, entry in table.items()}
     document.raise_mistakes()
-    notes = _scaling_notes(document)
+    notes = _scaling_notes(document) + _unread_notes(document)
     known = limits if robot is None else robot.joints
     unknown = [name for name in limits if name not in known]
     if unknown:
@@ -89,18 +99,28 @@ def _scaling_notes(document: Document) -> list[str]:
     return notes
 
 
+def _unread_notes(document: Document) -> list[str]:
+    """Name keys of joints that count for nothing, each where it comes first."""
+    places = {
+        str(key): ("joint_limits", name, key)
+        for name, entry in reversed(document.data["joint_limits"].items())
+        for key in entry
+        if key not in _KEYS and key not in _NEEDLESS
+    }
+    return [
+        f"{document.place(location, of_key=True)}: {key} is not read; "
+        f"{did_you_mean(key, _KEYS)}"
+        for key, location in sorted(places.items())
+    ]
+
+
 def _one(document: Document, name: str, entry: Any) -> MoveItLimits:
     location = ("joint_limits", name)
     if not isinstance(entry, dict):
         document.add(location, "expected a mapping")
         return {}
     limits: MoveItLimits = {}
-    for kind, keys in (
-        ("velocity", ("max_velocity",)),
-        ("acceleration", ("max_acceleration",)),
-        ("jerk", ("max_jerk",)),
-        ("position", ("min_position", "max_position")),
-    ):
+    for kind, keys in _READ.items():
         flag = f"has_{kind}_limits"
         given = entry.get(flag, any(key in entry for key in keys))
         on = _FLAGS.get(str(given).lower())
@@ -137,8 +157,10 @@ def tighten_limits(
     table: Mapping[str, MoveItLimits],
     robot: UrdfDescription,
     moving: Collection[str],
-) -> None:
+) -> list[str]:
     """Write the limits of a MoveIt file into ``robot.limits``; the tightest wins.
+
+    Joints that are left without a range are told.
 
     Parameters
     ----------
@@ -162,6 +184,7 @@ def tighten_limits(
                 joint: min(value, (given or {}).get(joint, value)),
             }
         limits[key] = given
+    problems: list[str] = []
     for joint in moving:
         file = table.get(joint, {})
         if "min_position" not in file and "max_position" not in file:
@@ -172,7 +195,15 @@ def tighten_limits(
             continue  # a slide with one end; the model asks for the other
         pair = [math.degrees(low), math.degrees(high)] if turns else [low, high]
         own = limits["position_deg"].get(joint, pair)
-        limits["position_deg"][joint] = [max(pair[0], own[0]), min(pair[1], own[1])]
+        low, high = max(pair[0], own[0]), min(pair[1], own[1])
+        limits["position_deg"][joint] = [low, high]
+        if not low < high:
+            unit = "deg" if turns else "m"
+            problems.append(
+                f"joint {joint!r}: no range is left of that in the URDF or "
+                f"robot.limits (lower {low:.6g}, upper {high:.6g} {unit})"
+            )
+    return problems
 
 
 def _range(file: MoveItLimits, joint: UrdfJoint) -> tuple[float | None, float | None]:

@@ -218,8 +218,9 @@ class Resolver:
 
     def _in_package(self, reference: str) -> tuple[Path, Path]:
         """File and package folder of a ``package://`` reference."""
-        # Some write three slashes.
-        name, _, rest = reference.removeprefix(SCHEME).lstrip("/").partition("/")
+        # Some write three slashes, or two in a row later on.
+        parts = reference.removeprefix(SCHEME).split("/")
+        name, _, rest = "/".join(part for part in parts if part).partition("/")
         if not name or not rest:
             raise NotFoundError(f"{reference!r}: expected package://NAME/PATH")
         folders, _ = self.package_folders(name)

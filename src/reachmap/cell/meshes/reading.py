@@ -20,7 +20,7 @@ from reachmap.cell.model.shapes import TriangleMesh
 
 __all__ = ["MeshError", "read_mesh"]
 
-_STL_VERTEX = re.compile(rb"\bvertex\s+(\S+)\s+(\S+)\s+(\S+)")
+_STL_VERTEX = re.compile(rb"\bvertex\s+(\S+)\s+(\S+)\s+(\S+)", re.IGNORECASE)
 _OTHERS = {
     ".glb": "glTF", ".gltf": "glTF", ".step": "STEP", ".stp": "STEP",
     ".iges": "IGES", ".igs": "IGES", ".3ds": "3DS", ".fbx": "FBX", ".usd": "USD",
