@@ -84,7 +84,7 @@ def run(*arguments: str, folder: Path, row: dict[str, object]) -> str:
     said = [line for line in done.stderr.splitlines() if line.strip()]
     if done.returncode != 0:
         raise StepError(" ".join(said[:3]) or "(nothing)")
-    if any("0 %" in line for line in said):
+    if any("nothing is reachable" in line for line in said):
         row[f"{step} said"] = said
     return done.stdout
 

@@ -432,6 +432,40 @@ def test_a_flange_too_wide_for_the_bin_is_given_a_tool(tmp_path: Path) -> None:
     assert (reached(output, tmp_path).status == Status.PATH_FOUND).any()
 
 
+def test_the_tcp_is_at_the_end_of_the_tool_in_the_urdf(tmp_path: Path) -> None:
+    """A gripper beyond the flange, which would otherwise meet the part first."""
+    body = f'<link name="gripper">{solid("0 0 0.1", "0.04 0.04 0.2")}</link>'
+    path = urdf(tmp_path / "arm.urdf", arm(body + fixed("g", "tool0", "gripper")))
+    made = new_cell(path, output=tmp_path / "cell.yaml")
+    tcp = read_cell(str(tmp_path / "cell.yaml")).cell.robot.tcp
+    assert (tcp.parent, tcp.xyz) == ("tool0", (0, 0, 0.2))
+    assert "0.2 m beyond tool0, at the end of what the URDF has there" in made.stderr
+
+
+def test_links_that_touch_too_often_are_named(tmp_path: Path) -> None:
+    """Shapes that are too coarse make a map red; allowing it is up to the user."""
+    ball = '<collision><geometry><sphere radius="0.33"/></geometry></collision>'
+    inside = arm().replace('<link name="link3">', f'<link name="link3">{ball}')
+    made = new_cell(urdf(tmp_path / "a.urdf", inside), output=tmp_path / "cell.yaml")
+    said = re.search(r"note: link1 and link3 touch in (\d+)% of random", made.stderr)
+    assert said is not None
+    assert 50 <= int(said[1]) < 98
+    assert not (tmp_path / "cell.srdf").exists()
+
+
+@pytest.mark.slow
+def test_an_arm_that_hangs_from_a_shoulder_finds_its_bin(tmp_path: Path) -> None:
+    """Its tool points down beside and below it, hardly ever in front."""
+    talos = "package://example-robot-data/robots/talos_data/robots/talos_left_arm.urdf"
+    output = tmp_path / "cell.yaml"
+    new_cell(talos, output=output)
+    x, y, z = read_cell(str(output)).cell.bin.pose.xyz
+    assert x == 0.0
+    assert y > 0.3
+    assert z < -0.2
+    assert (reached(output, tmp_path).status == Status.PATH_FOUND).any()
+
+
 def test_a_tool_point_stays_where_its_maker_has_it(tmp_path: Path) -> None:
     """A link called tcp is none that carries a tool."""
     inside = arm(fixed("g", "tool0", "hand_tcp"), flange='xyz="0 0 0.05"').replace(

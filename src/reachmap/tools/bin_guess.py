@@ -160,6 +160,11 @@ def guess_notes(guess: BinGuess, tip: str) -> list[str]:
             f"robot.tcp is {guess.tool_m:g} m beyond {tip}, at the end of what the "
             "URDF has there"
         )
+    if guess.share < ENOUGH:
+        notes.append(
+            f"{guess.share:.0%} of a few test grasps are met there: reachmap place-bin "
+            "looks for better places, reachmap bin-scan says what is in the way"
+        )
     return notes
 
 

@@ -258,7 +258,9 @@ class _Attempt:
 
     def _without_touching(self, scene: Scene, Q: FloatArray) -> Scene:
         """Disable pairs of links that touch in every position, in an SRDF."""
-        pairs = trial.always_touching(scene, Q)
+        touching = trial.touching_links(scene, Q)
+        pairs = [pair for pair, share in touching.items() if share >= trial.ALWAYS]
+        self.notes += trial.touching_notes(touching)
         if not pairs:
             return scene
         if self.choices.srdf:

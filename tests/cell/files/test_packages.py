@@ -85,6 +85,7 @@ def test_what_the_user_says_comes_before_what_lies_around(
         ("a%20b.stl", "package://arm/a%20b.stl"),
         ("a b.stl", "package://arm/a%20b.stl"),
         ("a.stl", "package:///arm/a.stl"),
+        ("meshes/a.stl", "package://arm//meshes//a.stl"),
         ("a%20b.stl", "../a%20b.stl"),
     ],
 )

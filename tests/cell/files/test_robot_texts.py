@@ -9,7 +9,8 @@ from pathlib import Path
 import pinocchio as pin
 import pytest
 
-from reachmap.cell.files.resources import data_folder
+from reachmap.cell.files.resources import Resolver, data_folder
+from reachmap.cell.files.robot_text import robot_text
 from reachmap.cell.files.srdf import parse_srdf
 from reachmap.cell.files.urdf import parse_urdf
 from reachmap.cell.loading import read_cell
@@ -215,8 +216,7 @@ def test_an_unknown_xacro_argument_is_a_mistake(
 
 def test_a_plain_urdf_takes_no_xacro_arguments(xacro_cell: Path) -> None:
     """Arguments that nothing reads are a mistake, too."""
-    urdf = XACRO.replace("xacro:", "").replace("${half}", "0")
-    (xacro_cell.parent / "toy.urdf").write_text(urdf)
+    (xacro_cell.parent / "toy.urdf").write_text(robot(*CHAIN))
     with pytest.raises(CellError, match=r"xacro_args\.length: .*the URDF takes none"):
         read_cell(str(xacro_cell), ["robot.urdf=toy.urdf"])
 
@@ -239,3 +239,26 @@ def test_without_the_extra_the_message_names_it(
         MissingExtraError, match=r"pip install 'reachmap-cells\[xacro\]"
     ):
         read_cell(str(xacro_cell))
+
+
+@pytest.mark.parametrize(
+    ("inside", "found"),
+    [
+        ('<link name="${prefix}a"/>', "'[$]{prefix}a'"),
+        ('<xacro:include filename="b.xacro"/>', "<xacro:include>"),
+        ('<link name="a"/><!-- ${x} --><xacro:macro name="m"><link name="${x}"/>'
+         "</xacro:macro>", ""),
+    ],
+)  # fmt: skip
+def test_a_urdf_that_is_to_be_expanded_says_so(
+    tmp_path: Path, inside: str, found: str
+) -> None:
+    """Expressions outside definitions, which are left over in expanded files."""
+    path = tmp_path / "arm.urdf"
+    path.write_text(f'<robot name="r" xmlns:xacro="x">{inside}</robot>')
+    resolver = Resolver(directory=tmp_path)
+    if not found:
+        assert robot_text(path, {}, resolver).text == path.read_text()
+        return
+    with pytest.raises(CellError, match=f"has {found}, which .*arm.urdf.xacro"):
+        robot_text(path, {}, resolver)

@@ -88,6 +88,7 @@ def test_arguments_are_those_declared_or_used_anywhere(tmp_path: Path) -> None:
         ('<link name="${nobody}"/>', "nobody"),
         ("<xacro:macro_that_is_not/>", "macro_that_is_not"),
         ("<link>", "mismatched tag"),
+        ('<link name="$(env NIX)"/>', "expanded: environment variable 'NIX' is not se"),
     ],
 )
 def test_a_failure_is_one_line_with_a_remedy(

@@ -63,6 +63,9 @@ FILES = {
     "ascii.STL": b"solid x\n"
     + b"".join(b"vertex %f %f %f\n" % tuple(row) for row in TRIANGLE)
     + b"endsolid\n",
+    "upper.stl": b"SOLID X\n"
+    + b"".join(b"VERTEX %E %E %E\n" % tuple(row) for row in TRIANGLE)
+    + b"ENDSOLID X\n",
     "a.obj": b"# x\nvn 9 9 9\nv 0 0 0\nv 1 0 2 1.0\n v 8 8 8\nv 0 3 0\nf 1 2 3\n",
     "ascii.ply": ply("ascii"),
     "little.ply": ply("binary_little_endian"),

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from reachmap.cell.loading import read_cell
+from reachmap.core.kinematics.kinematics import Kinematics
 from reachmap.core.robot.model import RobotModel
 from reachmap.errors import CellError, SceneError
 from tests.support.kinematics_arms import (
@@ -164,6 +165,19 @@ def test_continuous_joints_become_one_angle() -> None:
     assert wide.upper_rad[0] == pytest.approx(2 * np.pi)
     with pytest.raises(SceneError, match="no velocity limit for joint_1"):
         robot(serial_urdf([Link(kind="continuous"), *TWO]), "link_3")
+
+
+def test_names_that_the_engine_does_not_take_do_no_harm() -> None:
+    """A link called universe, as the engine's own, and a robot without a name."""
+    text = serial_urdf(TWO)
+    odd = text.replace(' name="arm"', "").replace('"link_1"', '"universe"')
+    q = np.array([0.3, -0.7])
+    T_plain, T_odd = (
+        Kinematics(robot(urdf, "link_2")).forward(q) for urdf in (text, odd)
+    )
+    np.testing.assert_array_equal(T_odd, T_plain)
+    T_link = Kinematics(robot(odd, "universe")).forward(q[:1])
+    np.testing.assert_allclose(T_link[:2, 0], [np.cos(0.3), np.sin(0.3)])
 
 
 def test_frames_of_the_cell_come_before_links_of_the_same_name() -> None:

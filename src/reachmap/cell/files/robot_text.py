@@ -54,16 +54,26 @@ def robot_text(
     if path.suffix == ".xacro":
         return expand_xacro(path, arguments, resolver)
     text = read_xml(path, limit=MAX_URDF_BYTES)
-    if "<xacro:" in text:
+    if "<xacro:" in text or "${" in text:
         _refuse_xacro(text, path)
     return Expansion(text=text, arguments=(), packages={}, warnings=())
 
 
 def _refuse_xacro(text: str, path: Path) -> None:
-    """Refuse elements that would have to be expanded; definitions alone do no harm."""
-    for element in parse_xml(text, path.name).iter():
-        if element.tag.startswith("xacro:") and element.tag not in DEFINITIONS:
+    """Refuse what would have to be expanded; definitions alone do no harm."""
+    todo = [parse_xml(text, path.name)]
+    while todo:
+        element = todo.pop()
+        if element.tag in DEFINITIONS:
+            continue
+        todo += element
+        found = [
+            f"{value[:40]!r}" for value in element.attrib.values() if "${" in value
+        ]
+        if element.tag.startswith("xacro:"):
+            found.insert(0, f"<{element.tag}>")
+        if found:
             raise CellError(
-                f"{path}: has <{element.tag}>, which is to be expanded; name the file "
+                f"{path}: has {found[0]}, which is to be expanded; name the file "
                 f"{path.name}.xacro"
             )

@@ -123,7 +123,9 @@ def _explained(error: Exception) -> dict[str, str]:
     for cause in reversed(causes):
         if isinstance(cause, substitution_args.ArgException):
             return {"missing": str(cause)}
-        if isinstance(cause, CellError | NotFoundError):
+        if isinstance(
+            cause, CellError | NotFoundError | substitution_args.SubstitutionException
+        ):
             return {"error": str(cause)}
     if isinstance(causes[-1], MemoryError):
         return {}

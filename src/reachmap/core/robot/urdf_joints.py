@@ -109,7 +109,9 @@ def _follower(name: str, joints: Mapping[str, UrdfJoint]) -> Follower:
 
 def _engine_text(urdf: str, description: UrdfDescription) -> str:
     root = parse_xml(urdf, "robot.urdf")
-    shared = set(description.links) & set(description.joints)
+    # The engine refuses a robot without a name, and has a link of this name itself.
+    root.set("name", root.get("name") or "robot")
+    shared = {*description.links} & {*description.joints, "universe"}
     for link in root.findall("link"):
         for part in [*link.findall("visual"), *link.findall("collision")]:
             link.remove(part)
