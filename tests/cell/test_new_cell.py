@@ -126,15 +126,15 @@ def test_a_package_that_is_named_stays_in_the_cell(
     folder = tmp_path / ("vendor" if place == "near" else "a/b/c/vendor")
     write(folder / "m" / "a.stl", STL)
     home = tmp_path / ("." if place == "near" else "d/e/f")
-    path = urdf(home / "arm.urdf", arm(mesh_of("pkg")))
+    path = urdf(home / "arm.urdf", arm(mesh_of("only_here")))
     failed = new_cell(path, output=home / "cell.yaml", code=2)
-    assert "--package pkg=FOLDER" in failed.stderr
+    assert "--package only_here=FOLDER" in failed.stderr
     assert not (home / "cell.yaml").exists()
     monkeypatch.chdir(folder.parent)
-    new_cell(path, "--package", "pkg=vendor", output=home / "cell.yaml")
+    new_cell(path, "--package", "only_here=vendor", output=home / "cell.yaml")
     written = (home / "cell.yaml").read_text()
     shown = "vendor" if place == "near" else str(folder)
-    assert f"packages: {{pkg: {shown}}}" in written.replace('"', "")
+    assert f"packages: {{only_here: {shown}}}" in written.replace('"', "")
     monkeypatch.chdir("/")
     checked(home / "cell.yaml")
 
@@ -145,7 +145,7 @@ def test_a_package_of_the_environment_is_written_down(
 ) -> None:
     """The next shell does not have the variable."""
     write(tmp_path / "far" / "ws" / "x" / "pkg" / "m" / "a.stl", STL)
-    path = urdf(tmp_path / "home" / "arm.urdf", arm(mesh_of("pkg")))
+    path = urdf(tmp_path / "home" / "arm.urdf", arm(mesh_of("only_here")))
     monkeypatch.setenv(variable, str(tmp_path / "far" / "ws" / "x"))
     output = path.parent / "cell.yaml"
     new_cell(path, output=output)
