@@ -6,7 +6,7 @@ import re
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
-from reachmap.cell.files.urdf import UrdfDescription
+from reachmap.cell.files.urdf import FREE_JOINTS, UrdfDescription
 from reachmap.errors import SettingsError
 
 # Ends of the names that flanges and tool points have in published robot descriptions,
@@ -25,11 +25,14 @@ ARM_JOINTS, FINGER_JOINTS = 4, 4
 
 
 def guess_base(robot: UrdfDescription) -> str:
-    """Link to measure from: the root, or what a root named world carries."""
-    below = [j for j in robot.joints.values() if j.parent == robot.root]
-    if robot.root == "world" and len(below) == 1 and below[0].type == "fixed":
+    """Link to measure from: the root, or what a root named world or free carries."""
+    base = robot.root
+    below = [joint for joint in robot.joints.values() if joint.parent == base]
+    if len(below) == 1 and (
+        below[0].type in FREE_JOINTS or (base, below[0].type) == ("world", "fixed")
+    ):
         return below[0].child
-    return robot.root
+    return base
 
 
 def guess_tip(robot: UrdfDescription, base: str, joints: Collection[str] = ()) -> str:

@@ -135,10 +135,26 @@ def test_a_mimic_joint_in_the_arm_is_refused() -> None:
         robot(serial_urdf(arm), "link_2")
 
 
-def test_floating_joints_are_refused() -> None:
-    """Joints with several degrees of freedom are named."""
-    with pytest.raises(SceneError, match=r"'joint_1' has type 'floating'"):
-        robot(serial_urdf([Link(kind="floating"), Link()]), "link_2")
+@pytest.mark.parametrize("kind", ["floating", "planar"])
+def test_joints_of_several_degrees_of_freedom_stay_out_of_the_chain(kind: str) -> None:
+    """Above the base or beside the arm they are held at zero, as MoveIt holds them."""
+    plain = serial_urdf([Link(kind="fixed", xyz=(0, 0, 1)), *TWO])
+    free = plain.replace('type="fixed"', f'type="{kind}"')
+    message = rf"'joint_1' between base and TCP has .*'{kind}'.*base_frame: link_1"
+    with pytest.raises(SceneError, match=message):
+        robot(free, "link_3")
+    arm = robot(free, "link_3", base_frame="link_1")
+    q = np.array([0.2, -0.4])
+    same = robot(plain, "link_3", base_frame="link_1")
+    np.testing.assert_array_equal(
+        Kinematics(arm).forward(q), Kinematics(same).forward(q)
+    )
+    beside = plain.replace(
+        "</robot>",
+        f'<link name="o"/><joint name="oj" type="{kind}"><parent link="link_1"/>'
+        '<child link="o"/></joint></robot>',
+    )
+    assert robot(beside, "link_3").joint_names == ("joint_2", "joint_3")
 
 
 @pytest.mark.parametrize("text", ["<robot", "<sdf/>"])

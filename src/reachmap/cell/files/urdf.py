@@ -28,7 +28,9 @@ from reachmap.geometry import inverse_transform
 MAX_URDF_BYTES = 20_000_000
 MAX_LINKS = 2_000
 MOVING = ("revolute", "continuous", "prismatic")
-JOINT_TYPES = (*MOVING, "fixed", "floating", "planar")
+# Of several degrees of freedom: held at zero beside the arm, refused in it.
+FREE_JOINTS = ("floating", "planar")
+JOINT_TYPES = (*MOVING, "fixed", *FREE_JOINTS)
 # Root elements of other formats that come as XML.
 OTHER_ROOTS = {
     "mujoco": "this is MJCF (MuJoCo)",
@@ -100,14 +102,18 @@ class UrdfDescription:
         Frames are links, or joints, which stand for their child link. The way ends
         at the last ancestor that ``base`` and ``tip`` share.
         """
+        return tuple(joint.name for joint in self.way(base, tip) if joint.moves)
+
+    def way(self, base: str, tip: str) -> tuple[UrdfJoint, ...]:
+        """List all joints on that way, fixed ones included."""
         shared = {link for link, _ in self._way_up(base)}
-        names = []
+        joints = []
         for link, joint in self._way_up(tip):
             if link in shared:
                 break
-            if joint is not None and joint.moves:
-                names.append(joint.name)
-        return tuple(reversed(names))
+            if joint is not None:
+                joints.append(joint)
+        return tuple(reversed(joints))
 
     def _way_up(self, frame: str) -> Iterator[tuple[str, UrdfJoint | None]]:
         """Yield each link from a frame to the root, with the joint above it."""
@@ -120,9 +126,9 @@ class UrdfDescription:
         yield link, None
 
     def fixed_to(self, link: str) -> dict[str, FloatArray]:
-        """Poses (4, 4) in a link of all links that fixed joints tie to it."""
+        """Poses (4, 4) in a link of all links that never move against it."""
         poses = {link: np.eye(4)}
-        fixed = [joint for joint in self.joints.values() if joint.type == "fixed"]
+        fixed = [joint for joint in self.joints.values() if joint.type not in MOVING]
         # A link may be reached from either side; each pass adds one or ends it.
         for _ in fixed:
             for joint in fixed:
@@ -204,6 +210,8 @@ def _joint(
         given if (given := _number(mimic, key, name, faults)) is not None else default
         for key, default in (("multiplier", 1.0), ("offset", 0.0))
     ]
+    if kind in FREE_JOINTS:
+        notes.append(f"joint {name!r} is {kind}; it is held at zero")
     if kind in MOVING:
         faults += _axis_faults(element, name)
     return UrdfJoint(

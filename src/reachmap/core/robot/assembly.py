@@ -11,6 +11,7 @@ import numpy as np
 import pinocchio as pin
 
 from reachmap._typing import FloatArray
+from reachmap.cell.files.urdf import FREE_JOINTS, MOVING
 from reachmap.cell.model.cell import JointLimits, RobotSpec
 from reachmap.core.robot.limits import LimitTable, merge_limits
 from reachmap.core.robot.urdf_joints import LINK_MARK, Follower, UrdfJoints
@@ -93,6 +94,16 @@ def moving_joints(
             for name in spec.joints
             if name in locked
         ]
+    way = urdf.description.way(
+        spec.base_frame or urdf.description.root, spec.tcp.parent
+    )
+    problems += [
+        f"robot.urdf: joint {joint.name!r} between base and TCP has type "
+        f"{joint.type!r}; only fixed, {', '.join(MOVING)} joints are supported there "
+        f"(robot.base_frame: {joint.child} leaves it out)"
+        for joint in way
+        if joint.type in FREE_JOINTS
+    ]
     names = list(model.names)[1:]
     problems += [
         f"robot.locked_joints_deg: no joint {name!r} (joints: {', '.join(names)})"

@@ -12,6 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from reachmap.cell.files.urdf import (
+    FREE_JOINTS,
     MOVING,
     UrdfDescription,
     UrdfJoint,
@@ -70,16 +71,11 @@ def read_urdf_joints(urdf: str) -> UrdfJoints:
     CellError
         The text is no URDF.
     SceneError
-        A joint has more than one degree of freedom, or joints mimic in a circle.
+        Joints mimic in a circle.
     """
     description = parse_urdf(urdf, "robot.urdf")
-    joints = {n: j for n, j in description.joints.items() if j.type != "fixed"}
-    problems = [
-        f"robot.urdf: joint {joint.name!r} has type {joint.type!r}; "
-        f"only fixed, {', '.join(MOVING)} joints are supported"
-        for joint in joints.values()
-        if joint.type not in MOVING
-    ]
+    joints = {n: j for n, j in description.joints.items() if j.type in MOVING}
+    problems = []
     followers = {}
     for name, joint in joints.items():
         if joint.mimics is not None:
@@ -125,6 +121,8 @@ def _engine_text(urdf: str, description: UrdfDescription) -> str:
             end = joint.find(tag)
             if end is not None and end.get("link") in shared:
                 end.set("link", end.get("link", "") + LINK_MARK)
+        if joint.get("type") in FREE_JOINTS:
+            joint.set("type", "fixed")
         if joint.get("type") in MOVING:
             _bound(joint, description.joints[joint.get("name", "")])
     return ET.tostring(root, encoding="unicode")
