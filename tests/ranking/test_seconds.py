@@ -43,7 +43,7 @@ def shares_whole(bin_map: Any, ranker: Ranker, grasps: np.ndarray) -> np.ndarray
     whole = np.isfinite(bin_map.cycle.cycle_time).reshape(ranker.table.reachable.shape)
     table = dataclasses.replace(ranker.table, reachable=whole)
     near = Surroundings(table).share_reached(queries)
-    return np.minimum(near / ranker.surroundings.share_reached(queries), 1.0)
+    return np.minimum(near / ranker.share_reached(queries), 1.0)
 
 
 def test_seconds_of_a_pick_by_hand():

@@ -94,6 +94,31 @@ class Components:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Refinement:
+    """Grasps between the test grasps whose verdict alone is known, in any roll.
+
+    Attributes
+    ----------
+    position : array, shape (n, 3)
+        In robot_base [m].
+    quaternion_wxyz : array, shape (n, 4)
+        R_base_tcp in the roll that is reached, in any where none is.
+    status : uint8 array, shape (n,)
+        Codes of :class:`reachmap.maps.records.Status`.
+    lever_m : float
+        Length of the tool, by which angles and distances between grasps compare [m].
+    """
+
+    position: FloatArray
+    quaternion_wxyz: FloatArray
+    status: CodeArray
+    lever_m: float
+
+    def __post_init__(self) -> None:
+        freeze(self)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Effort:
     """State checks of each attempt.
 

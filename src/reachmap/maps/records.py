@@ -19,6 +19,7 @@ from reachmap.maps.parts import (
     Effort,
     Margins,
     PathStore,
+    Refinement,
     freeze,
 )
 from reachmap.maps.showing import Shown, ShownBin
@@ -232,12 +233,11 @@ class BinMap(ShownBin):
     path_reachability : array, shape (nl, ny, nx)
         Percent over orientations.
     component : int array, shape (nl, ny, nx, no), or None
-        Connected component of the roadmap, -1 where there is none.
+        Connected component of the roadmap, -1: none.
     winning_roll : array, shape (nl, ny, nx, no), or None
-        Roll about the approach axis that the best path takes, where roll is free
-        [rad]; NaN without a path.
-    T_world_base : array, shape (4, 4), or None
-    components, effort, best, times, margins, cycle, part_corners
+        Roll of the best path, where roll is free [rad]; NaN without a path.
+    T_world_base, components, effort, best, times, margins, cycle, part_corners,
+    refinement
         What maps hold since version 1.1; None where the file does not.
     """
 
@@ -282,6 +282,7 @@ class BinMap(ShownBin):
     margins: Margins | None = None
     cycle: Cycle | None = None
     part_corners: FloatArray | None = None
+    refinement: Refinement | None = None
     T_world_base: FloatArray | None = None
 
     def __post_init__(self) -> None:

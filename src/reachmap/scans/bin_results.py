@@ -19,6 +19,7 @@ from reachmap.maps.parts import (
     Components,
     Effort,
     Margins,
+    Refinement,
     freeze,
 )
 from reachmap.maps.records import NO_PAIR
@@ -173,6 +174,7 @@ def assemble_bin_map(
     *,
     run: RunInfo,
     components: Components | None,
+    refinement: Refinement | None = None,
 ) -> BinMap:
     """Make the map of a scan.
 
@@ -185,6 +187,8 @@ def assemble_bin_map(
     run : RunInfo
     components : Components or None
         Evidence of the roadmap; None where the unit that holds it is missing.
+    refinement : Refinement, optional
+        What is known between the test grasps.
     """
     cell = Cell.model_validate_json(document["provenance"]["cell_resolved_json"])
     T_base_bin = cell.T_base_bin()
@@ -217,6 +221,7 @@ def assemble_bin_map(
         goal_configuration=shaped(_ends(results, best)),
         component=None if components is None else shaped(results.component),
         components=components,
+        refinement=refinement,
         best=BestPaths(
             **{name: shaped(getattr(best, name)) for name in BestPaths.__slots__}
         ),

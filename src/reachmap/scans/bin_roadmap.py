@@ -137,6 +137,22 @@ def connected_goals(
     return _roadmap_from_payload(survey, payload)
 
 
+def lengths_over_roadmap(
+    scene: Scene, stages: Stages, phase: str, survey: Survey
+) -> FloatArray:
+    """Connect a survey; length of the path to each goal [rad], infinite without one."""
+
+    def connect(progress: Progress) -> dict[str, Any]:
+        connection = connect_survey(
+            scene, survey, seed=scene.loaded.cell.seed, progress=progress
+        )
+        paths = connection.roadmap.shortest_paths()
+        node = connection.roadmap.shortest_to_goals(paths)
+        return {"length_rad": paths.length_rad[node]}
+
+    return np.asarray(stages.once(phase, connect)["length_rad"])
+
+
 def roadmap_of(scene: Scene, survey: Survey) -> BinRoadmap:
     """Connect the goals of a survey here and now."""
     silent = Progress("", quiet=True)

@@ -18,7 +18,7 @@ from reachmap.core.planning.planner import PlanResult
 from reachmap.core.planning.timing import path_length_rad
 from reachmap.core.scene import Scene
 from reachmap.maps import BinMap, RunInfo, Status, write_bin_map
-from reachmap.maps.parts import Components
+from reachmap.maps.parts import Components, Refinement
 from reachmap.runtime.job import Job, Kind, Stages, Work, blocks, one_frame
 from reachmap.runtime.progress import Progress
 from reachmap.scans.bin_results import NO_PATH, GraspResults, assemble_bin_map
@@ -37,6 +37,7 @@ from reachmap.scans.document import journal_settings
 from reachmap.scans.ik_survey import Survey
 from reachmap.scans.margins import MarginMeter
 from reachmap.scans.measured import MEASURED, Meter, attempt_seed
+from reachmap.scans.refinement import refine
 from reachmap.scans.routes import RouteAttempts, WayIn
 
 if TYPE_CHECKING:
@@ -60,12 +61,15 @@ class BinContext:
         As the map numbers them.
     cycles : tuple of CycleKnowledge or None
         Of each filling, where the cell has a part.
+    refinement : Refinement or None
+        What is known between the test grasps.
     """
 
     fillings: tuple[LoadedCell, ...]
     known: tuple[BinRoadmap, ...]
     body_pairs: tuple[str, ...]
     cycles: tuple[CycleKnowledge | None, ...]
+    refinement: Refinement | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,6 +165,7 @@ def planning_job(scene: Scene, body_pairs: tuple[str, ...], stages: Stages) -> J
         known=tuple(known),
         body_pairs=body_pairs,
         cycles=tuple(cycles),
+        refinement=refine(scene, stages),
     )
     return Job(function=plan_unit, context=whole, tally=tally)
 
@@ -168,7 +173,8 @@ def planning_job(scene: Scene, body_pairs: tuple[str, ...], stages: Stages) -> J
 def plan_unit(context: BinContext, grasps: range) -> dict[str, Any]:
     """Make all attempts at the test grasps of one unit.
 
-    The first unit of a filling tells the evidence of its roadmap.
+    The first unit of a filling tells the evidence of its roadmap, the first of all
+    what is known between the test grasps.
     """
     each = len(context.known[0].component)
     layer, first = divmod(grasps.start, each)
@@ -189,6 +195,8 @@ def plan_unit(context: BinContext, grasps: range) -> dict[str, Any]:
     )
     if first == 0:
         payload["components"] = dataclasses.asdict(known.components)
+    if grasps.start == 0 and context.refinement is not None:
+        payload["refinement"] = dataclasses.asdict(context.refinement)
     return payload
 
 
@@ -368,11 +376,14 @@ def assemble(
     """Make the map from the payloads of all units."""
     parts: list[GraspResults] = []
     evidence: list[Components] = []
+    refinement = None
     for payload in payloads:
         fields = dict(payload)
         components = fields.pop("components", None)
         if components is not None:
             evidence.append(components_from_payload(components))
+        if (between := fields.pop("refinement", None)) is not None:
+            refinement = Refinement(**between)
         if fields["cycle"] is not None:
             fields["cycle"] = CycleResults(**fields["cycle"])
         parts.append(GraspResults(**fields))
@@ -382,6 +393,7 @@ def assemble(
         GraspResults.join(parts),
         run=run,
         components=join_components(evidence) if complete else None,
+        refinement=refinement,
     )
 
 

@@ -95,6 +95,14 @@ class Survey:
             high=np.maximum.reduceat(self.way, self.way_begin),
         )
 
+    def payload(self) -> dict[str, Any]:
+        """What a store keeps of it."""
+        return {
+            f.name: value
+            for f in dataclasses.fields(self)
+            if (value := getattr(self, f.name)) is not None
+        }
+
     def goals_of(self, frame: int) -> IntArray:
         """Rows of the goals of one frame."""
         return self.goals_of_group(
@@ -314,9 +322,4 @@ def survey_unit(
     """Survey one block of frames."""
     context, scene = state
     T = context.grids[block[0]].transforms_at(block[1])
-    survey = survey_frames(scene, T, context.approach_m)
-    return {
-        f.name: value
-        for f in dataclasses.fields(survey)
-        if (value := getattr(survey, f.name)) is not None
-    }
+    return survey_frames(scene, T, context.approach_m).payload()

@@ -76,13 +76,23 @@ class RollGroups:
             group=group.ravel(),
             roll=np.tile(roll - roll[leaders[member]], points),
             T=grid.transforms_at(frames),
-            turns=_halving(tool.count()).astype(float) * TURN_RAD / tool.count(),
+            turns=_turns(tool),
+        )
+
+    @classmethod
+    def apart(cls, T: FloatArray, tool: ToolSpec) -> RollGroups:
+        """Test grasps (n, 4, 4) of which no two differ by a roll alone."""
+        return cls(
+            group=np.arange(len(T)),
+            roll=np.zeros(len(T)),
+            T=T,
+            turns=_turns(tool),
         )
 
     def turned(self, groups: IntArray, turns: FloatArray, axis: str) -> FloatArray:
         """Poses of groups at some rolls, shape (groups · rolls, 4, 4)."""
         T_roll = np.tile(np.eye(4), (len(turns), 1, 1))
-        T_roll[:, :3, :3] = [_rotation(axis, float(turn)) for turn in turns]
+        T_roll[:, :3, :3] = roll_rotations(axis, turns)
         T = self.T[groups][:, None] @ T_roll
         return np.asarray(T.reshape(-1, 4, 4))
 
@@ -195,15 +205,20 @@ def _roll_between(R_from: FloatArray, R_to: FloatArray, axis: str) -> float:
     return sign * float(np.arctan2(R[last, after], R[after, after]))
 
 
-def _rotation(axis: str, angle_rad: float) -> FloatArray:
-    """Rotation about the approach axis, shape (3, 3)."""
+def roll_rotations(axis: str, angles_rad: FloatArray) -> FloatArray:
+    """Rotations about the approach axis, shape (n, 3, 3)."""
     column, sign = AXES[axis]
     after, last = (column + 1) % 3, (column + 2) % 3
-    cosine, sine = np.cos(angle_rad), sign * np.sin(angle_rad)
-    R = np.eye(3)
-    R[after, after], R[last, last] = cosine, cosine
-    R[last, after], R[after, last] = sine, -sine
+    cosine, sine = np.cos(angles_rad), sign * np.sin(angles_rad)
+    R = np.tile(np.eye(3), (len(angles_rad), 1, 1))
+    R[:, after, after], R[:, last, last] = cosine, cosine
+    R[:, last, after], R[:, after, last] = sine, -sine
     return R
+
+
+def _turns(tool: ToolSpec) -> FloatArray:
+    """Rolls besides the first that will do, each far from those before it [rad]."""
+    return _halving(tool.count()).astype(float) * TURN_RAD / tool.count()
 
 
 def _halving(count: int) -> IntArray:

@@ -127,7 +127,7 @@ def judge_list(
         share=np.where(
             np.isnan(ranking.probability),
             np.nan,
-            ranker.surroundings.share_reached(ranked.queries),
+            ranker.share_reached(ranked.queries),
         ),
         probability=ranking.probability.copy(),
         outside=outside,

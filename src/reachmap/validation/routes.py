@@ -105,8 +105,7 @@ def _seeded(scene: Scene, seed: int, roadmap: int) -> Scene:
 def survey_pick(context: PickContext, pick: int) -> dict[str, Any]:
     """Goals of all tool poses of one grasp."""
     scene = Scene.shared(context.loaded, with_bin=True)
-    survey = survey_of_pick(context, scene, pick)
-    return {f.name: getattr(survey, f.name) for f in dataclasses.fields(survey)}
+    return survey_of_pick(context, scene, pick).payload()
 
 
 def plan_over_routes(context: RouteContext, k: int) -> dict[str, Any]:

@@ -145,6 +145,14 @@ class BinScanSpec(Record):
         description="roadmap: paths branch off a shared network of routes; planner: "
         "the planner searches for each from scratch, as in the paper.",
     )
+    refine: int = Field(
+        2000,
+        ge=0,
+        le=10_000,
+        description="Grasps between the test grasps whose verdict alone is found, "
+        "drawn where it is in doubt; at most as many as there are test grasps, and "
+        "only where the roll is free. 0: none.",
+    )
     approach_distance_m: Approach = Field(
         0.0,
         description="Straight approach before the grasp [m]; 0 plans to the pose; "

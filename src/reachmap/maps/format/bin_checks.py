@@ -264,6 +264,14 @@ def _check_stage(tree: Tree) -> list[str]:
     )
 
 
+def _check_refinement(tree: Tree) -> list[str]:
+    lever_m = tree.leaves["refinement/position"].attributes["lever_m"]
+    return [
+        *check_quaternions(tree.array("refinement/quaternion_wxyz"), "refinement/"),
+        *require(np.array(0.0 < lever_m < np.inf), "lever_m must be a length above 0"),
+    ]
+
+
 _CHECKS = {
     "direction_reachability": _check_rolls,
     "winning_roll": _check_winning_roll,
@@ -273,4 +281,5 @@ _CHECKS = {
     "clearance": _check_margins,
     "cycle/stage_status": _check_cycle,
     "paths/stage": _check_stage,
+    "refinement/status": _check_refinement,
 }

@@ -54,6 +54,7 @@ from reachmap.ranking.lookup.settings import (
 )
 from reachmap.ranking.lookup.surroundings import Surroundings
 from reachmap.ranking.lookup.table import GraspTable, table_from_bin_map
+from reachmap.ranking.lookup.verdict import RefinedVerdicts, refined_matches
 from reachmap.ranking.terms.columns import LIKENESS, Columns, columns_of, cycle_of
 from reachmap.ranking.terms.seconds import FAILURE
 
@@ -86,8 +87,8 @@ class Ranker:
     stamp : Stamp
         Identity of the map.
     calibration : Calibration or None
-    surroundings : Surroundings
-        Share reached around any grasp.
+    refined : RefinedVerdicts or None
+        Verdicts between the test grasps; None where the map has none.
     """
 
     def __init__(
@@ -100,7 +101,8 @@ class Ranker:
             raise MapFileError("the calibration was made for another map")
         self.calibration = calibration
         self.table: GraspTable = table_from_bin_map(bin_map, basis)
-        self.surroundings = Surroundings(self.table)
+        self._around = Surroundings(self.table)
+        self.refined = RefinedVerdicts.of(bin_map, self.table)
         self._room = PartRoom.of(bin_map, self.table.T_bin_base)
         self._whole_around, self._held_around = self._cycles_around()
         self.frames: Mapping[str, FloatArray] = frames_of(bin_map)
@@ -222,24 +224,27 @@ class Ranker:
         matches = match(queries, table, self._tree, columns.costs())
         outside = outside_map(queries.points, matches.point, table)
         unlike = unlike_map(matches, queries.free, table, settings.max_angle_deg)
+        share = self.share_reached(queries)
+        probability = self.calibration(share) if self.calibration else share
+        matches, causes = refined_matches(self.refined, queries, matches, share)
         room = np.ones(len(queries), bool)
         if settings.cost == "cycle" and self._room is not None:
             room = self._room.is_there(queries)
             matches = self._past_walls(queries, matches, columns, room)
-        probability = self._probability(queries)
         if settings.cost == "cycle":
             whole = probability * self._share_whole(queries)
             names, terms = self._seconds(matches, columns, settings, whole)
         else:
             names, terms = self._terms(queries, matches, columns, settings)
         matched = queries.valid & ~outside & ~unlike
-        cost = np.where(matched & room, terms.sum(axis=1), np.inf)
+        cost = np.where(matched & room & (causes == 0), terms.sum(axis=1), np.inf)
         cost[np.isnan(cost)] = np.inf
         reachable = np.isfinite(cost)
         status = _status_of(table, settings)[matches.point, matches.orientation]
         reached = table.reachable[matches.point, matches.orientation]
         absent = np.uint8(StageStatus.PART_IN_COLLISION)
         status = np.where(~room & reached, absent, status)
+        status = np.where(causes > 0, causes, status)
         status = np.where(unlike, np.uint8(UNLIKE_MAP), status)
         status = np.where(outside, np.uint8(OUTSIDE_MAP), status)
         status = np.where(queries.valid, status, np.uint8(INVALID))
@@ -260,9 +265,15 @@ class Ranker:
             + 0.0,
         )
 
-    def _probability(self, queries: Queries) -> FloatArray:
-        share = self.surroundings.share_reached(queries)
-        return share if self.calibration is None else self.calibration(share)
+    def share_reached(self, queries: Queries) -> FloatArray:
+        """Share reached around each grasp, in (0, 1); shape (n,).
+
+        By what is known between the test grasps, where it is and the roll is free.
+        """
+        share = self._around.share_reached(queries)
+        if self.refined is None or not queries.free.any():
+            return share
+        return np.where(queries.free, self.refined.share_reached(queries), share)
 
     def _cycles_around(self) -> tuple[Surroundings | None, Surroundings | None]:
         """Share with a whole cycle around any grasp, and share that it is of."""

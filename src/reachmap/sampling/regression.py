@@ -1,0 +1,91 @@
+"""Kernel ridge regression over grasps: what holds at any, from what holds at some.
+
+Two grasps are as far from each other as the tool has to move between them: its tip
+and a point further back, a *lever* away along the approach direction. Lengths and
+angles then need no weights, and a flat boundary of the tool against a wall stays flat.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from reachmap._typing import FloatArray
+
+# Width and ridge by the errors on 2,000 random grasps of two deep bins; half or twice
+# the width, a third or three times the ridge change them by less than a percent.
+WIDTH_SHARE: Final = 0.5
+RIDGE: Final = 0.02
+ROWS_AT_ONCE: Final = 4096
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class GraspRegression:
+    """A function of grasps, fitted to samples with values from 0 to 1.
+
+    Far from all samples it tends to one half: it does not know.
+
+    Attributes
+    ----------
+    nodes : array, shape (n, 6)
+        Tip and lever point of each sample [m].
+    weights : array, shape (n,)
+    lever_m, width_m : float
+    """
+
+    nodes: FloatArray
+    weights: FloatArray
+    lever_m: float
+    width_m: float
+
+    @classmethod
+    def fit(
+        cls, points: FloatArray, axes: FloatArray, values: FloatArray, lever_m: float
+    ) -> GraspRegression:
+        """Fit samples.
+
+        Parameters
+        ----------
+        points, axes : array, shape (n, 3)
+            Tips [m] and unit approach directions, in any common frame.
+        values : array, shape (n,)
+        lever_m : float
+            From the tip back to where the tool begins [m].
+        """
+        nodes = tool_points(points, axes, lever_m)
+        # The diagonal, were they spread evenly over a box, whichever way it lies.
+        extent = float(np.sqrt(12.0 * nodes.var(axis=0).sum()))
+        width = WIDTH_SHARE * extent if extent > 0 else 1.0
+        kernel = _matern(nodes, nodes, width)
+        kernel[np.diag_indices_from(kernel)] += RIDGE
+        weights = np.asarray(np.linalg.solve(kernel, values - 0.5), float)
+        return cls(nodes=nodes, weights=weights, lever_m=lever_m, width_m=width)
+
+    def __call__(self, points: FloatArray, axes: FloatArray) -> FloatArray:
+        """Value at grasps, shape (m,); between 0 and 1 but for overshoots."""
+        asked = tool_points(points, axes, self.lever_m)
+        parts = [
+            _matern(asked[k : k + ROWS_AT_ONCE], self.nodes, self.width_m)
+            @ self.weights
+            for k in range(0, len(asked), ROWS_AT_ONCE)
+        ]
+        return 0.5 + np.concatenate([np.zeros(0), *parts])
+
+
+def tool_points(points: FloatArray, axes: FloatArray, lever_m: float) -> FloatArray:
+    """Tip and lever point of grasps, shape (n, 6) [m]."""
+    return np.hstack([points, points - lever_m * axes])
+
+
+def squared_distances(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Squares of the distances between rows (n, k) and (m, k), shape (n, m)."""
+    square = (a**2).sum(axis=1)[:, None] + (b**2).sum(axis=1) - 2.0 * a @ b.T
+    return np.asarray(np.maximum(square, 0.0), float)
+
+
+def _matern(a: FloatArray, b: FloatArray, width: float) -> FloatArray:
+    """Matérn kernel of smoothness 3/2, shape (n, m)."""
+    r = np.sqrt(3.0 * squared_distances(a, b)) / width
+    return np.asarray((1.0 + r) * np.exp(-r))
