@@ -11,14 +11,19 @@ default those of benchmarks/hard_cells):
 - the mean path over the best that is known, and the share of the variance of length
   and execution time that is the grasp and not luck, for attempts over the roadmap and
   by the planner; the best known is the shortest of all attempts and of those over a
-  network three times as large, shortened further, with another seed.
+  network three times as large, shortened further, with another seed;
+- how well a map of the cell, whose cup is round, predicts random grasps of another
+  seed, planned to over roadmaps of their own: precision and recall of *reachable*, rank
+  correlation of J, of predicted and measured and of two halves of the measurement, and
+  the share of the variance of an attempt that is the grasp and not luck.
 
-``--verdicts`` leaves out the rest.
+``--verdicts`` leaves out all but the first, ``--predictions`` all but the last.
 """
 
 from __future__ import annotations
 
 import sys
+import tempfile
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -32,15 +37,21 @@ from reachmap.cell.model.roadmap import RoadmapSpec
 from reachmap.core.planning.connection import Connection, connect
 from reachmap.core.planning.timing import execution_time_s, path_length_rad
 from reachmap.core.scene import Scene
+from reachmap.runtime.options import RunOptions
 from reachmap.sampling.frames import bin_test_frames
 from reachmap.scans.bin_scan import plan_from_scratch
 from reachmap.scans.ik_survey import Survey, survey_frames
 from reachmap.scans.routes import RouteAttempts, Routes
+from reachmap.tools.bin_scan import bin_scan
+from reachmap.tools.validate import PickOptions, validate
 
 HERE = Path(__file__).parent / "hard_cells"
 SEEDS = (1, 2, 3)
 SAMPLE = 24
 REPEATS = 5
+# Maps of predictions, and the random grasps that they are judged by.
+MAPPED = ("tool.roll=free", "bin_scan.repeats=2")
+RANDOM, RANDOM_SEED, RANDOM_REPEATS = 200, 77, 4
 
 
 def survey_of(scene: Scene) -> Survey:
@@ -178,6 +189,29 @@ def quality(
         )
 
 
+def predictions(cell: Path) -> None:
+    """Print how well a map predicts random grasps."""
+    quiet = RunOptions(workers=1, quiet=True)
+    with tempfile.TemporaryDirectory() as folder:
+        path, begin = Path(folder) / "bin.h5", time.process_time()
+        bin_scan(None, path, cell=str(cell), overrides=MAPPED, run=quiet)
+        scan_s = time.process_time() - begin
+        pick = PickOptions(repeats=RANDOM_REPEATS, seed=RANDOM_SEED)
+        found = validate(path, random=RANDOM, pick=pick, run=quiet).validation
+    one, shares = found.overall, found.reliability
+    verdict = one.confusion
+    print(
+        f"  predicted (scan {scan_s:.0f} s of CPU), {one.grasps} random grasps: "
+        f"precision {100 * verdict.precision.share:.1f} % of {verdict.precision.total},"
+        f" recall {100 * verdict.recall.share:.1f} % of {verdict.recall.total}; "
+        f"Spearman of J {one.correlation.spearman:.2f}, of the measurement with itself "
+        f"{one.repeatability.spearman:.2f}; reliability of an attempt's length "
+        f"{shares['path_length'].share:.2f}, execution time "
+        f"{shares['execution_time'].share:.2f}",
+        flush=True,
+    )
+
+
 def reliability(values: FloatArray) -> float:
     """Share of the variance of means over attempts that lies between grasps."""
     luck = values.var(axis=1, ddof=1).mean() / values.shape[1]
@@ -186,16 +220,21 @@ def reliability(values: FloatArray) -> float:
 
 def main(names: Sequence[str]) -> None:
     """Print a paragraph per cell."""
-    only_verdicts = "--verdicts" in names
-    paths = [Path(name) for name in names if name != "--verdicts"] or [HERE]
+    only_verdicts, only_predictions = (
+        name in names for name in ("--verdicts", "--predictions")
+    )
+    paths = [Path(name) for name in names if not name.startswith("--")] or [HERE]
     cells = [
         cell
         for path in paths
         for cell in (sorted(path.glob("*.yaml")) if path.is_dir() else [path])
     ]
     for cell in cells:
-        scene = Scene.build(read_cell(str(cell)))
         print(cell.stem, flush=True)
+        if only_predictions:
+            predictions(cell)
+            continue
+        scene = Scene.build(read_cell(str(cell)))
         survey = survey_of(scene)
         connection = verdicts(scene, survey)
         if only_verdicts:
@@ -204,6 +243,7 @@ def main(names: Sequence[str]) -> None:
         frames = np.random.default_rng(0).permutation(reached)[:SAMPLE]
         per_frame(scene, survey, frames)
         quality(scene, survey, connection, frames)
+        predictions(cell)
 
 
 if __name__ == "__main__":
