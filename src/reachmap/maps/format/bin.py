@@ -27,7 +27,6 @@ from reachmap.maps.format.layout import (
     index,
     outcome,
 )
-from reachmap.maps.format.refinement import REFINEMENT
 from reachmap.maps.format.sections import BIN_SECTIONS
 from reachmap.maps.format.store import RecordFile
 from reachmap.maps.parts import PathStore
@@ -56,7 +55,7 @@ def _measured(name: str, units: str, meaning: str) -> Variable:
 BIN = Layout(
     kind="bin_map",
     check=check_bin,
-    sections=(*BIN_SECTIONS, REFINEMENT),
+    sections=BIN_SECTIONS,
     title="Path reachability of test grasps in a bin",
     signal="path_reachability",
     axes=_POINT,

@@ -269,6 +269,10 @@ def _check_refinement(tree: Tree) -> list[str]:
     return [
         *check_quaternions(tree.array("refinement/quaternion_wxyz"), "refinement/"),
         *require(np.array(0.0 < lever_m < np.inf), "lever_m must be a length above 0"),
+        *require(
+            np.array(tree.array("refinement/status").size > 0),
+            "refinement must have a sample",
+        ),
     ]
 
 

@@ -19,7 +19,9 @@ from reachmap.maps.parts import (
     Components,
     Effort,
     Margins,
+    Refinement,
 )
+from reachmap.maps.records import Status
 
 _POINT = ("layer", "y", "x")
 _GRASP = (*_POINT, "orientation")
@@ -263,9 +265,44 @@ MARGINS = Section(
 )
 
 
+REFINEMENT = Section(
+    field="refinement",
+    part=Refinement,
+    scales=(index("refinement/sample", "Grasps between the test grasps."),),
+    numbers={"lever_m": "lever_m"},
+    arrays={
+        "position": variable(
+            "refinement/position",
+            ("sample", "xyz"),
+            "f8",
+            "TCP position of grasps between the test grasps.",
+            units="m",
+            frame="robot_base",
+            number="lever_m",
+        ),
+        "quaternion_wxyz": variable(
+            "refinement/quaternion_wxyz",
+            ("sample", "quat"),
+            "f8",
+            "TCP orientation in the roll that is reached, in any where none is; unit "
+            "quaternion.",
+            frame="robot_base",
+            **_ONE,
+        ),
+        "status": variable(
+            "refinement/status",
+            ("sample",),
+            "u1",
+            "Outcome in any roll.",
+            codes=Status,
+            **_ONE,
+        ),
+    },
+)
+
 BIN_SECTIONS = (
     COMPONENT, COMPONENTS, CONFIDENCE, ROLLS, WINNING_ROLL, EFFORT, BEST, TIMES,
-    MARGINS, *CYCLE_SECTIONS, world(),
+    MARGINS, *CYCLE_SECTIONS, REFINEMENT, world(),
 )  # fmt: skip
 WORKSPACE_SECTIONS = (
     COMPONENTS,

@@ -54,7 +54,7 @@ from reachmap.ranking.lookup.settings import (
 )
 from reachmap.ranking.lookup.surroundings import Surroundings
 from reachmap.ranking.lookup.table import GraspTable, table_from_bin_map
-from reachmap.ranking.lookup.verdict import RefinedVerdicts, refined_matches
+from reachmap.ranking.lookup.verdict import RefinedVerdicts
 from reachmap.ranking.terms.columns import LIKENESS, Columns, columns_of, cycle_of
 from reachmap.ranking.terms.seconds import FAILURE
 
@@ -102,7 +102,8 @@ class Ranker:
         self.calibration = calibration
         self.table: GraspTable = table_from_bin_map(bin_map, basis)
         self._around = Surroundings(self.table)
-        self.refined = RefinedVerdicts.of(bin_map, self.table)
+        between = bin_map.refinement
+        self.refined = None if between is None else RefinedVerdicts(between, self.table)
         self._room = PartRoom.of(bin_map, self.table.T_bin_base)
         self._whole_around, self._held_around = self._cycles_around()
         self.frames: Mapping[str, FloatArray] = frames_of(bin_map)
@@ -226,7 +227,9 @@ class Ranker:
         unlike = unlike_map(matches, queries.free, table, settings.max_angle_deg)
         share = self.share_reached(queries)
         probability = self.calibration(share) if self.calibration else share
-        matches, causes = refined_matches(self.refined, queries, matches, share)
+        causes = np.zeros(len(queries), np.uint8)
+        if self.refined is not None:
+            matches, causes = self.refined.decide(queries, matches, share)
         room = np.ones(len(queries), bool)
         if settings.cost == "cycle" and self._room is not None:
             room = self._room.is_there(queries)
@@ -273,7 +276,7 @@ class Ranker:
         share = self._around.share_reached(queries)
         if self.refined is None or not queries.free.any():
             return share
-        return np.where(queries.free, self.refined.share_reached(queries), share)
+        return np.where(queries.free, self.refined.share_reached(queries, share), share)
 
     def _cycles_around(self) -> tuple[Surroundings | None, Surroundings | None]:
         """Share with a whole cycle around any grasp, and share that it is of."""
