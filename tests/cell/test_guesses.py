@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import pytest
 
 from reachmap.cell.files.resources import data_folder
 from reachmap.cell.files.urdf import UrdfDescription, parse_urdf
-from reachmap.cell.guesses import guess_base, guess_tip
+from reachmap.cell.guesses import guess_base, guess_tip, other_tips
 
 
 def robot(*joints: str, arm: int = 6) -> UrdfDescription:
@@ -113,3 +115,21 @@ def test_flanges_of_published_arms(name: str, tip: str) -> None:
         pytest.skip("not in this version of example-robot-data")
     found = parse_urdf(path.read_text(), path.name)
     assert guess_tip(found, guess_base(found)) == tip
+
+
+def test_the_other_arms_are_named() -> None:
+    """One on the base, one beyond a shared joint; no fingers, necks or own links."""
+    second = [f"{a}>{b} revolute" for a, b in pairwise(["l0", *"abcdef"])]
+    third = [f"{a}>{b} revolute" for a, b in pairwise(["l1", *"uvwxy"])]
+    grip = ("f>g fixed", "g>p prismatic", "g>q prismatic", "f>f_tool0 fixed")
+    found = robot("l6>tool0 fixed", *second, *third, *grip, "l0>neck revolute")
+    (note,) = other_tips(found, "l0", "tool0")
+    assert (
+        note == "the arm that ends at tool0 was chosen; --tip takes another: f_tool0, y"
+    )
+    assert (
+        other_tips(
+            robot("l6>tool0 fixed", "l6>p prismatic", "l6>q prismatic"), "l0", "tool0"
+        )
+        == []
+    )

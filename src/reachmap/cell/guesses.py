@@ -86,6 +86,25 @@ def guess_tip(robot: UrdfDescription, base: str, joints: Collection[str] = ()) -
     return _flange_beyond(last, arms)
 
 
+def other_tips(robot: UrdfDescription, base: str, tip: str) -> list[str]:
+    """Say which arms a robot has beside the one that ends at ``tip``."""
+    tree = _Tree.of(robot, base)
+    fingers, own = tree.fingers(), tree.chains[tip]
+    fewest = max(ARM_JOINTS, tree.independent(tip) / 2)
+    ends: dict[str, list[str]] = {}
+    for link, chain in tree.chains.items():
+        enough = tree.independent(link) >= fewest
+        beside = enough and chain[-1] not in own and own[-1] not in chain
+        if beside and not fingers.intersection(chain):
+            ends.setdefault(chain[-1], []).append(link)
+    inner = {name for links in ends.values() for name in tree.chains[links[0]][:-1]}
+    tips = [min(ends[last], key=_rank_of) for last in ends if last not in inner]
+    if not tips:
+        return []
+    shown = ", ".join(tips[:6]) + (", …" if len(tips) > 6 else "")
+    return [f"the arm that ends at {tip} was chosen; --tip takes another: {shown}"]
+
+
 def known_tip(link: str) -> int | None:
     """Rank of a link among the well-known names, 0 the best; None if it has none."""
     words = [w for w in re.split(r"[^a-z0-9]+", link.lower()) if w]

@@ -6,14 +6,14 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
 from reachmap._typing import FloatArray
 from reachmap.cell.files.moveit_config import planning_group
+from reachmap.cell.files.srdf import srdf_text
 from reachmap.cell.files.urdf import UrdfDescription
-from reachmap.cell.guesses import guess_base, guess_tip, is_tool_point
+from reachmap.cell.guesses import guess_base, guess_tip, is_tool_point, other_tips
 from reachmap.cell.loading import LoadedCell, cell_from_text
 from reachmap.cell.starter import (
     BINS_M,
@@ -128,6 +128,9 @@ def new_cell(
     inputs = [folder / name for name in (source.srdf, source.joint_limits) if name]
     check_output(target, overwrite=overwrite, inputs=inputs)
     attempt = _Attempt(folder, source, _first_choices(source, base, tip))
+    if tip is None and source.moveit is None:
+        others = other_tips(source.robot, attempt.choices.base, attempt.choices.tip)
+        attempt.notes += others
     problems = attempt.refine()
     choices = attempt.choices
     if attempt.srdf:
@@ -269,7 +272,7 @@ class _Attempt:
                 for a, b in pairs
             ]
             return scene
-        self.srdf = _srdf_text(self._source.robot.name, pairs)
+        self.srdf = srdf_text(self._source.robot.name, pairs)
         return Scene.build(self._loaded())
 
     def _with_bin(self, scene: Scene, Q: FloatArray) -> Scene:
@@ -384,16 +387,6 @@ def _body_lines(source: RobotSource, arm: RobotModel) -> list[str]:
         }
         lines.append(f"  - {scalar(entry)}")
     return lines
-
-
-def _srdf_text(name: str, pairs: list[tuple[str, str]]) -> str:
-    lines = ['<?xml version="1.0"?>', f"<robot name={quoteattr(name)}>"]
-    lines += [
-        f"  <disable_collisions link1={quoteattr(first)} link2={quoteattr(second)} "
-        'reason="Default"/>'
-        for first, second in pairs
-    ]
-    return "\n".join([*lines, "</robot>", ""])
 
 
 def _without_label(line: str) -> str:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from xml.etree import ElementTree
+from xml.sax.saxutils import quoteattr
 
 from reachmap.cell.files.urdf import UrdfDescription
 from reachmap.cell.files.xml_text import parse_xml
@@ -171,3 +172,14 @@ def _state(element: ElementTree.Element, label: str) -> dict[str, float]:
             )
         values[name] = value
     return values
+
+
+def srdf_text(name: str, pairs: Iterable[tuple[str, str]]) -> str:
+    """SRDF that disables collisions of pairs of links."""
+    lines = ['<?xml version="1.0"?>', f"<robot name={quoteattr(name)}>"]
+    lines += [
+        f"  <disable_collisions link1={quoteattr(first)} link2={quoteattr(second)} "
+        'reason="Default"/>'
+        for first, second in pairs
+    ]
+    return "\n".join([*lines, "</robot>", ""])

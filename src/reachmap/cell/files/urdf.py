@@ -161,6 +161,13 @@ def parse_urdf(text: str, label: str) -> UrdfDescription:
         raise CellError(
             f"{label}: expected the root element <robot> (got <{root.tag}>){what}"
         )
+    if root.find("link") is None:
+        hint = (
+            "; an SRDF goes with --moveit-config"
+            if root.find("group") is not None
+            else ""
+        )
+        raise CellError(f"{label}: expected <link> elements (got none){hint}")
     faults: list[str] = _number_faults(root)
     notes: list[str] = []
     links = [element.get("name", "") for element in root.findall("link")]
