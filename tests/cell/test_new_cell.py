@@ -144,7 +144,7 @@ def test_a_package_of_the_environment_is_written_down(
     variable: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The next shell does not have the variable."""
-    write(tmp_path / "far" / "ws" / "x" / "pkg" / "m" / "a.stl", STL)
+    write(tmp_path / "far" / "ws" / "x" / "only_here" / "m" / "a.stl", STL)
     path = urdf(tmp_path / "home" / "arm.urdf", arm(mesh_of("only_here")))
     monkeypatch.setenv(variable, str(tmp_path / "far" / "ws" / "x"))
     output = path.parent / "cell.yaml"
@@ -152,7 +152,7 @@ def test_a_package_of_the_environment_is_written_down(
     monkeypatch.delenv(variable)
     checked(output)
     assert read_cell(str(output)).cell.resources.packages == {
-        "pkg": str(tmp_path / "far" / "ws" / "x" / "pkg")
+        "only_here": str(tmp_path / "far" / "ws" / "x" / "only_here")
     }
 
 
