@@ -96,3 +96,16 @@ def test_too_few_grasps_are_refused_before_planning(folder, monkeypatch):
     result = run("validate", "bin.h5", "--random", 49, "--calibrate", "-j", 1)
     assert result.exit_code == 2
     assert "needs 50 grasps or more that the map speaks about (got 49)" in result.stderr
+
+
+def test_a_map_with_levels_of_filling_is_calibrated(tmp_path, monkeypatch):
+    """Its grasps are planned to in a bin that is filled up to each."""
+    monkeypatch.chdir(tmp_path)
+    levels = ["--set", "bin_scan.fill=[0.25, 1]", "--set", "bin_scan.repeats=1"]
+    scan = run("bin-scan", "--cell", "planar-toy", *levels, "-j", 1, "-o", "bin.h5")
+    assert scan.exit_code == 0, scan.stderr
+    result = run("validate", "bin.h5", "--random", 60, "-j", 1, "--calibrate")
+    assert result.exit_code == 0, result.stderr
+    assert "with the bin filled up to it" in result.stderr
+    known = json.loads((tmp_path / "bin.calibration.json").read_text())
+    assert known["grasps"] == 60

@@ -156,7 +156,7 @@ def validate(
         drawn = random_grasps(bin_map, random, context.seed)
         ranked.append(rank_list(drawn, ranker, settings=settings))
     if calibrate:
-        _check_calibration(map_path, context, pick, ranked)
+        _check_calibration(pick, ranked)
     context = _with_picks(context, ranked)
     attempts = _attempts(context)
     measure = plan_picks_over_routes if attempts == "roadmap" else plan_picks
@@ -273,21 +273,11 @@ def _check_request(
         raise SettingsError(f"top must be 1 or more (got {top})")
 
 
-def _check_calibration(
-    map_path: str | Path,
-    context: PickContext,
-    pick: PickOptions,
-    ranked: Sequence[RankedList],
-) -> None:
+def _check_calibration(pick: PickOptions, ranked: Sequence[RankedList]) -> None:
     """Refuse to calibrate with another cell than the map's, or with few grasps."""
     if pick.overrides:
         raise SettingsError(
             "--calibrate: plans in the cell of the map; leave out --set"
-        )
-    if context.loaded.cell.bin_scan.is_filled:
-        raise SettingsError(
-            f"--calibrate: {map_path} was scanned at levels of filling, and grasps are "
-            "planned to in the empty bin"
         )
     check_number(sum(int((~np.isnan(o.ranking.probability)).sum()) for o in ranked))
 
