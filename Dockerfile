@@ -1,6 +1,6 @@
 # docker build -t reachmap .                    everything
 # docker build -t reachmap --build-arg PARTS=ranking .   ranking with finished maps
-# docker run --rm -v "$PWD:/work" reachmap rank grasps.json
+# docker run --rm -v "$PWD:/work" --user "$(id -u):$(id -g)" reachmap rank grasps.json
 ARG PYTHON=3.12
 
 FROM python:${PYTHON}-slim AS build

@@ -134,6 +134,8 @@ $(VENV)/.dev: pyproject.toml | $(BIN)/python
 	@touch $(VENV)/.runtime $@
 
 # --- pipeline: every file is one command, and make knows what is up to date ---------
+# Not `reachmap run`, which refuses a folder whose cell has changed: make makes anew what
+# a newer cell or list leaves stale, and stops at any file (`make run/bin.h5`).
 
 $(RUN)/workspace.h5: $(wildcard cells/$(CELL).yaml $(CELL)) | $(VENV)/.runtime
 	@mkdir -p $(RUN)
