@@ -39,12 +39,12 @@ from tests.support.exported_motions import READERS  # noqa: E402
 
 def replay_exports(map_path: Path, scene: Scene, every: int) -> int:
     """Replay what each format says; the number of motions that collide or differ."""
-    check, start = DenseCheck(scene, margin_m=0.0), scene.scan_configuration
+    check = DenseCheck(scene, margin_m=0.0)
     wrong = 0
     reference: list[FloatArray] = []
     for to, read in READERS.items():
         text = export(map_path, every=True, to=to).text
-        motions = read(text, start)
+        motions = read(text)
         if to == "csv":
             reference = motions
             checked = motions[::every]

@@ -169,10 +169,11 @@ def test_every_format_says_the_verified_motion(tmp_path: Path, to: str) -> None:
     assert record is not None
     scene = Scene.build(cell_of_artefact(record.provenance, str(path)))
     text = run(path, "--all", "--to", to).stdout
-    motions = READERS[to](text, scene.scan_configuration)
+    motions = READERS[to](text)
     assert len(motions) == len(best_rows(record)) > 50
     check = DenseCheck(scene, margin_m=0.0)
     for way, place in zip(motions, best_rows(record), strict=True):
         goal = scene.kinematics.forward(way[-1])[:3, 3]
         np.testing.assert_allclose(goal, record.position[place[:3]], atol=1e-6)
+        np.testing.assert_allclose(way[0], scene.scan_configuration, atol=1e-6)
         assert check.path_is_free(way)

@@ -12,11 +12,10 @@ from ruamel.yaml import YAML
 
 from reachmap._typing import FloatArray
 
-Reader = Callable[[str, FloatArray], list[FloatArray]]
-"""Of a text and the configuration that motions begin at, which programs leave out."""
+Reader = Callable[[str], list[FloatArray]]
 
 
-def from_csv(text: str, start: FloatArray) -> list[FloatArray]:
+def from_csv(text: str) -> list[FloatArray]:
     """Way-points of each motion, (n, dof) each."""
     lines = [line for line in text.splitlines() if not line.startswith("#")]
     motions: dict[tuple[str, ...], list[list[float]]] = {}
@@ -25,36 +24,36 @@ def from_csv(text: str, start: FloatArray) -> list[FloatArray]:
     return [np.array(way) for way in motions.values()]
 
 
-def from_json(text: str, start: FloatArray) -> list[FloatArray]:
+def from_json(text: str) -> list[FloatArray]:
     """Way-points of each motion."""
     return [np.array(one["configuration"]) for one in json.loads(text)["motions"]]
 
 
-def from_joint_trajectory(text: str, start: FloatArray) -> list[FloatArray]:
+def from_joint_trajectory(text: str) -> list[FloatArray]:
     """Sampled positions of each message."""
     return [_positions(one) for one in _documents(text)]
 
 
-def from_moveit(text: str, start: FloatArray) -> list[FloatArray]:
+def from_moveit(text: str) -> list[FloatArray]:
     """Sampled positions of each message."""
     return [_positions(one["joint_trajectory"]) for one in _documents(text)]
 
 
-def from_urscript(text: str, start: FloatArray) -> list[FloatArray]:
+def from_urscript(text: str) -> list[FloatArray]:
     """Targets of ``movej`` of each function."""
-    return _programs(text, r"def (\w+)\(\):(.*?)\nend", r"movej\(\[([^]]*)\]", start)
+    return _programs(text, r"def (\w+)\(\):(.*?)\nend", r"movej\(\[([^]]*)\]")
 
 
-def from_krl(text: str, start: FloatArray) -> list[FloatArray]:
+def from_krl(text: str) -> list[FloatArray]:
     """Targets of ``PTP`` of each subroutine, degrees in the file."""
     axes = r"PTP \{AXIS: ([^}]*)\}"
-    return _programs(text, r"DEF (\w+)\(\)(.*?)\nEND", axes, start, degrees=True)
+    return _programs(text, r"DEF (\w+)\(\)(.*?)\nEND", axes, degrees=True)
 
 
-def from_rapid(text: str, start: FloatArray) -> list[FloatArray]:
+def from_rapid(text: str) -> list[FloatArray]:
     """Targets of ``MoveAbsJ`` of each procedure, degrees in the file."""
     axes = r"MoveAbsJ \[\[([^]]*)\]"
-    return _programs(text, r"PROC (\w+)\(\)(.*?)ENDPROC", axes, start, degrees=True)
+    return _programs(text, r"PROC (\w+)\(\)(.*?)ENDPROC", axes, degrees=True)
 
 
 READERS: Mapping[str, Reader] = {
@@ -89,7 +88,7 @@ def _positions(trajectory: dict) -> FloatArray:
 
 
 def _programs(
-    text: str, routine: str, target: str, start: FloatArray, *, degrees: bool = False
+    text: str, routine: str, target: str, *, degrees: bool = False
 ) -> list[FloatArray]:
     motions = []
     for _, body in re.findall(routine, text, flags=re.DOTALL):
@@ -97,6 +96,5 @@ def _programs(
             [float(re.sub(r"^\s*A\d ", "", value)) for value in row.split(",")]
             for row in re.findall(target, body)
         ]
-        goals = np.radians(rows) if degrees else np.array(rows)
-        motions.append(np.vstack([start, goals]))
+        motions.append(np.radians(rows) if degrees else np.array(rows))
     return motions

@@ -63,6 +63,8 @@ class Origin:
             f"joints {', '.join(self.joint_names)}: signs and zeros of the URDF",
             "joint motions with an exact stop at every point (blend radius 0), as "
             "verified; do not blend",
+            "each begins at its first point, the scan configuration; the way there was "
+            "not verified",
         ]
 
 
@@ -125,7 +127,7 @@ def as_urscript(motions: Sequence[Motion], origin: Origin) -> str:
         lines += [f"def {_name(motion)}():"]
         lines += [
             f"  movej([{', '.join(f'{x:.9f}' for x in q)}], a={a:.6g}, v={v:.6g}, r=0)"
-            for q in motion.configuration[1:]
+            for q in motion.configuration
         ]
         lines += ["end", ""]
     return "\n".join(lines).rstrip() + "\n"
@@ -137,7 +139,7 @@ def as_krl(motions: Sequence[Motion], origin: Origin) -> str:
     lines = [f"; {line}" for line in origin.lines()]
     for motion in motions:
         lines += [f"DEF {_name(motion)}()", "  $ADVANCE = 0"]
-        for q in motion.configuration[1:]:
+        for q in motion.configuration:
             axes = ", ".join(f"A{k} {x:.7f}" for k, x in enumerate(np.rad2deg(q), 1))
             lines.append(f"  PTP {{AXIS: {axes}}}")
         lines += ["END", ""]
@@ -151,7 +153,7 @@ def as_rapid(motions: Sequence[Motion], origin: Origin) -> str:
     lines.append("MODULE reachmap_motions")
     for motion in motions:
         lines.append(f"  PROC {_name(motion)}()")
-        for q in motion.configuration[1:]:
+        for q in motion.configuration:
             axes = ", ".join(f"{x:.7f}" for x in np.rad2deg(q))
             target = f"[[{axes}], [9E9, 9E9, 9E9, 9E9, 9E9, 9E9]]"
             lines.append(f"    MoveAbsJ {target}, v1000, fine, tool0;")
