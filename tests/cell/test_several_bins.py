@@ -132,6 +132,7 @@ def test_carriers_and_supports_are_of_each(tmp_path):
     [
         ("pick_from=rigt", "pick_from: no bin 'rigt'; did you mean 'right'"),
         ("bins.left.carrier=KLT-99", "bins.left.carrier: no carrier 'KLT-99'"),
+        ("bins.rihgt.carrier=KLT-4147", "bins has no key 'rihgt'; did you mean"),
         ("bins.right.carrier=KLT-99", "bins.right.carrier: no carrier 'KLT-99'"),
         ("bins.left.inner=[1, 2]", "bins.left.inner.2: a value is missing"),
         ("bins.right.inner=[1, 2]", "bins.right.inner.2: a value is missing"),

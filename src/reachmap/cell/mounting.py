@@ -108,6 +108,7 @@ def _body_of(mount: MountSpec) -> dict[str, Any] | None:
 def check_bins_stand(document: Document, cell: Cell) -> None:
     """Add a mistake where a bin stands on its side or its head in the world."""
     T_world_base = inverse_transform(cell.T_base_world())
+    leans = tilt_rad(T_world_base[:3, :3]) > 0
     for place, spec in cell.every_bin():
         T_world_bin = T_world_base @ cell.T_base_of(spec)
         tilt = float(np.degrees(tilt_rad(T_world_bin[:3, :3])))
@@ -116,7 +117,7 @@ def check_bins_stand(document: Document, cell: Cell) -> None:
         hint = (
             "robot_base itself leans, so give the pose in the world with "
             f"{'.'.join(place)}.frame: world"
-            if spec.frame == "robot_base"
+            if leans and spec.frame == "robot_base"
             else "its z axis must point up"
         )
         document.add(

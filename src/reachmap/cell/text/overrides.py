@@ -65,8 +65,8 @@ def _apply(document: Document, text: str, place: Place, model: type[BaseModel]) 
     parts = [part.strip() for part in path.strip().split(".")]
     container, location = document.data, ()  # type: tuple[Any, Location]
     for index, part in enumerate(parts):
-        key = _key(container, part, location, model)
         last = index == len(parts) - 1
+        key = _key(container, part, location, model, last=last)
         location = (*location, key)
         if (
             last
@@ -92,7 +92,12 @@ def _apply(document: Document, text: str, place: Place, model: type[BaseModel]) 
 
 
 def _key(
-    container: Any, part: str, location: Location, model: type[BaseModel]
+    container: Any,
+    part: str,
+    location: Location,
+    model: type[BaseModel],
+    *,
+    last: bool,
 ) -> str | int:
     """Key or index that ``part`` means in a container; _PathError if it has none."""
     where = ".".join(str(item) for item in location) or "the cell"
@@ -114,7 +119,8 @@ def _key(
     if not isinstance(container, dict):
         raise _PathError(f"{where} is a single value (got .{part} after it)")
     known = known_keys(model, location)
-    if location == ("parameters",):
+    # A bin may be added whole, but not by one of its keys.
+    if location == ("parameters",) or (location == ("bins",) and not last):
         known = tuple(container)
     if known and part not in known:
         raise _PathError(f"{where} has no key {part!r}; {did_you_mean(part, known)}")
