@@ -5,7 +5,7 @@ which parts come out; here every part is planned to as well, from the scan confi
 with the cell's own planner and as many rolls as the map has, in the bin filled up to
 that part. Both pick in the same way, so what stays differs by what the map is wrong in.
 
-    python benchmarks/bench_emptying.py bin.h5 [heaps [LxWxH in mm]]
+    python benchmarks/bench_emptying.py bin.h5 [heaps [LxWxH in mm [first seed]]]
 """
 
 from __future__ import annotations
@@ -71,6 +71,7 @@ def main() -> None:
     record = read_bin_map(Path(sys.argv[1]))
     heaps = int(sys.argv[2]) if len(sys.argv) > 2 else 3
     sides = sys.argv[3] if len(sys.argv) > 3 else "80x60x40"
+    first = int(sys.argv[4]) if len(sys.argv) > 4 else SEED
     x, y, z = (float(side) / 1e3 for side in sides.split("x"))
     loaded = cell_of_artefact(record.provenance, sys.argv[1])
     cell = loaded.cell
@@ -78,7 +79,7 @@ def main() -> None:
     rolls = max(cell.tool.count(), *(ring.rolls for ring in rings))
     ranker, gaps = Ranker(record), []
     for number in range(heaps):
-        heap = drop_heap(cell.bin, (x, y, z), FILL, SEED + number)
+        heap = drop_heap(cell.bin, (x, y, z), FILL, first + number)
         told, _ = part_costs(ranker, record, heap)
         done = np.array(
             [
