@@ -31,7 +31,7 @@ from reachmap.placement.decision import paper_pose
 from reachmap.placement.mapped.evaluator import open_evaluator
 from reachmap.placement.mapped.exact import Pose
 from reachmap.placement.mapped.sample import Grid
-from reachmap.placement.problem import Question
+from reachmap.placement.problem import PlacementProblem
 from reachmap.placement.tolerance import moved_by
 from reachmap.runtime.options import RunOptions
 from reachmap.runtime.progress import Progress
@@ -39,14 +39,14 @@ from reachmap.tools.place_bin import PlacementChoice, placed_bin
 from reachmap.tools.workspace_scan import workspace_scan
 
 QUIET = RunOptions(workers=1, quiet=True)
-GRID: Grid = (6, 5, 1)
+GRID: Grid = (4, 3, 2)
 SEED, TRIES = 1, 4000
 
 
-def neighbourhood(pose: Pose, question: Question) -> Iterator[Pose]:
+def neighbourhood(pose: Pose, problem: PlacementProblem) -> Iterator[Pose]:
     """The pose and what its tolerance allows, corners first."""
     yield pose
-    scale, floats = question.tolerance.scale, question.tolerance.floats
+    scale, floats = problem.tolerance.scale, problem.tolerance.floats
     for x, y, yaw in product((1.0, -1.0), repeat=3):
         yield moved_by(pose, scale * [x, y, 0.0, yaw])
     for axis in (0, 1, 2, 3) if floats else (0, 1, 3):
@@ -54,35 +54,35 @@ def neighbourhood(pose: Pose, question: Question) -> Iterator[Pose]:
             yield moved_by(pose, scale * (sign * np.eye(4)[axis]))
 
 
-def worst(pose: Pose, question: Question, enough_below: float = -1.0) -> float:
+def worst(pose: Pose, problem: PlacementProblem, enough_below: float = -1.0) -> float:
     """Least score of a neighbourhood [percent]; 0 where the bin cannot stand.
 
     Ends where a score is below a number.
     """
     found = 100.0
-    poses = list(neighbourhood(pose, question))
+    poses = list(neighbourhood(pose, problem))
     # Contact costs next to nothing, so it is asked everywhere first.
-    if any(question.fit.contact(question.T_base_bin(near)) for near in poses):
+    if any(problem.fit.contact(problem.T_base_bin(near)) for near in poses):
         return 0.0
     for near in poses:
-        (here,) = question.evaluator.evaluate([near], question.start, grid=GRID)
+        (here,) = problem.evaluator.evaluate([near], problem.start, grid=GRID)
         found = min(found, 0.0 if here.score is None else here.score.score)
         if found <= enough_below:
             break
     return found
 
 
-def random_poses(question: Question, count: int) -> list[Pose]:
+def random_poses(problem: PlacementProblem, count: int) -> list[Pose]:
     """Feasible poses, uniform over the region and over supports."""
     rng, found = np.random.default_rng(SEED), []
-    region, bottom = question.region, question.loaded.cell.bin.bottom_m
+    region, bottom = problem.region, problem.loaded.cell.bin.bottom_m
     for _ in range(TRIES):
         x, y, z, yaw = rng.uniform(region.low, region.high).tolist()
-        if question.supports:
-            face = question.supports[rng.integers(len(question.supports))]
+        if problem.supports:
+            face = problem.supports[rng.integers(len(problem.supports))]
             z = face.z + bottom
         pose = (x, y, z, yaw)
-        if not question.reason_against(pose) and question.can_be_imaged(pose):
+        if not problem.reason_against(pose) and problem.can_be_imaged(pose):
             found.append(pose)
         if len(found) == count:
             break
@@ -96,19 +96,17 @@ def compare(cell: str, overrides: Sequence[str], count: int, folder: Path) -> No
     mapped = read_workspace_map(workspace)
     loaded = cell_of_artefact(mapped.provenance, str(workspace), ())
     placed = placed_bin(loaded, mapped, PlacementChoice(), QUIET)
-    placement, question = placed.placement, placed.question
+    placement, problem = placed.placement, placed.problem
     x, y, z, yaw = placement.candidate_pose[placement.chosen].tolist()
     chosen: Pose = (x, y, z, yaw)
     progress = Progress("bench", quiet=True)
-    with open_evaluator(
-        loaded, question.is_open, QUIET, progress=progress
-    ) as evaluator:
-        question = dataclasses.replace(question, evaluator=evaluator)
-        own = worst(chosen, question)
-        paper = paper_pose(question)
-        of_paper = np.nan if paper is None else worst(paper, question, own - 1e-9)
-        poses = random_poses(question, count)
-        others = [worst(pose, question, own) for pose in poses]
+    with open_evaluator(loaded, problem.is_open, QUIET, progress=progress) as evaluator:
+        problem = dataclasses.replace(problem, evaluator=evaluator)
+        own = worst(chosen, problem)
+        paper = paper_pose(problem)
+        of_paper = np.nan if paper is None else worst(paper, problem, own - 1e-9)
+        poses = random_poses(problem, count)
+        others = [worst(pose, problem, own) for pose in poses]
     name = read_cell(cell, overrides).cell.name
     where = f"{x:+.3f} {y:+.3f} {z:+.3f} {np.degrees(yaw):.0f}°"
     stands = placement.support or "floats"
@@ -118,7 +116,7 @@ def compare(cell: str, overrides: Sequence[str], count: int, folder: Path) -> No
         f"{placement.worst_score[placement.chosen]:.1f} %, paper's rule "
         f"{of_paper:.1f} %, better random poses {len(better)} of {len(others)} "
         f"(best {max(others, default=np.nan):.1f} %), supports "
-        f"{len(question.supports)}, {evaluator.cpu_s:.0f} s",
+        f"{len(problem.supports)}, {evaluator.cpu_s:.0f} s",
         flush=True,
     )
 
