@@ -97,6 +97,21 @@ def test_a_name_that_is_not_utf_8_is_refused_at_once(
     assert list(tmp_path.iterdir()) == []
 
 
+def test_names_that_are_not_utf_8_are_shown_or_refused(tmp_path: Path) -> None:
+    """Maps may have them, in pictures, too; a starter cell could not name its robot."""
+    done = run(
+        tmp_path,
+        "a=$(printf '\\xfe.h5'); cp $BIN $a && cp $BIN b.h5 && "
+        "reachmap compare $a b.h5 --picture o.png",
+        env={"BIN": str(_toy_map(tmp_path))},
+    )
+    assert done.returncode == 0, done.stderr
+    assert rb"\xfe.h5" in done.stdout
+    done = run(tmp_path, "reachmap new-cell $(printf '\\xfe.urdf')")
+    assert done.returncode == 2
+    assert rb"\xfe.urdf: the path is not UTF-8 text" in done.stderr
+
+
 def test_a_name_beyond_ascii_is_written_in_any_locale(tmp_path: Path) -> None:
     """Even where Python itself reads names as ASCII, they are stored as UTF-8."""
     (tmp_path / "é").mkdir()

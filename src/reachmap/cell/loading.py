@@ -55,6 +55,13 @@ def shipped_cells() -> dict[str, Path]:
     return {path.stem: path for path in sorted(shipped_folder().glob("*.yaml"))}
 
 
+def check_storable(path: Path) -> None:
+    """Raise CellError where a path could not be written down."""
+    if not is_text(str(path.absolute())):
+        name = recorded_name(str(path.absolute()))
+        raise CellError(f"{name}: the path is not UTF-8 text, and could not be stored")
+
+
 def read_cell(name_or_path: str | Path, overrides: Sequence[str] = ()) -> LoadedCell:
     """Read a cell, with everything it refers to.
 
@@ -72,9 +79,7 @@ def read_cell(name_or_path: str | Path, overrides: Sequence[str] = ()) -> Loaded
     """
     name_or_path = str(name_or_path)
     path = cell_path(str(name_or_path))
-    if not is_text(str(path.absolute())):
-        name = recorded_name(str(path.absolute()))
-        raise CellError(f"{name}: the path is not UTF-8 text, and could not be stored")
+    check_storable(path)
     text = read_text(path, limit=MAX_TEXT_BYTES)
     return cell_from_text(
         text,

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from reachmap.disk import recorded_name
 from reachmap.errors import GateFailedError, SettingsError
 from reachmap.maps.bytes.to_json import json_ready
 from reachmap.maps.comparison.comparison import Comparison, SquareChange, compare_maps
@@ -45,8 +46,10 @@ class MapComparison:
     @property
     def names(self) -> tuple[str, str]:
         """What to call the maps: their file names, or paths where these agree."""
-        a, b = self.paths
-        return (str(a), str(b)) if a.name == b.name else (a.name, b.name)
+        (a, b), (first, second) = self.paths, (path.name for path in self.paths)
+        if first == second:
+            first, second = str(a), str(b)
+        return recorded_name(first), recorded_name(second)
 
     @property
     def headline(self) -> str:

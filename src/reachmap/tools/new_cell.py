@@ -14,7 +14,7 @@ from reachmap.cell.files.moveit_config import planning_group
 from reachmap.cell.files.srdf import srdf_text
 from reachmap.cell.files.urdf import UrdfDescription
 from reachmap.cell.guesses import guess_base, guess_tip, is_tool_point, other_tips
-from reachmap.cell.loading import LoadedCell, cell_from_text
+from reachmap.cell.loading import LoadedCell, cell_from_text, check_storable
 from reachmap.cell.starter import (
     BINS_M,
     StarterChoices,
@@ -116,6 +116,8 @@ def new_cell(
     urdf = str(urdf)
     target = check_output(output, overwrite=overwrite, inputs=[urdf])
     folder = target.parent
+    for place in (Path(urdf), folder):
+        check_storable(place)
     srdf_target = target.with_suffix(".srdf")
     check_output(srdf_target, overwrite=True, inputs=[urdf])
     source = read_source(
