@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
@@ -101,12 +102,21 @@ def test_names_that_are_not_utf_8_are_shown_or_refused(tmp_path: Path) -> None:
     """Maps may have them, in pictures, too; a starter cell could not name its robot."""
     done = run(
         tmp_path,
-        "a=$(printf '\\xfe.h5'); cp $BIN $a && cp $BIN b.h5 && "
-        "reachmap compare $a b.h5 --picture o.png",
+        "a=$(printf '\\xfe.h5'); cp $BIN $a && cp $BIN bin.h5 && "
+        "reachmap compare $a bin.h5 --picture o.png",
         env={"BIN": str(_toy_map(tmp_path))},
     )
     assert done.returncode == 0, done.stderr
     assert rb"\xfe.h5" in done.stdout
+    grasp = {"id": "\ud800", "position": [0, 0, 0.2], "direction": [0, 0, -1]}
+    head = {"format": "reachmap.grasps", "format_version": "1.0", "frame": "bin"}
+    (tmp_path / os.fsdecode(b"\xfe.json")).write_text(
+        json.dumps(head | {"units": {"length": "m"}, "grasps": [grasp]})
+    )
+    rank = "rank $(printf '\\xfe.json') --map bin.h5 --chart c.png -o ranked.json"
+    done = run(tmp_path, f"reachmap {rank} && reachmap report . -o r.html")
+    assert done.returncode == 0, done.stderr
+    assert "\\ud800" in (tmp_path / "r.html").read_text(encoding="utf-8")
     done = run(tmp_path, "reachmap new-cell $(printf '\\xfe.urdf')")
     assert done.returncode == 2
     assert rb"\xfe.urdf: the path is not UTF-8 text" in done.stderr

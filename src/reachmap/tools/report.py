@@ -41,7 +41,8 @@ def report(folder: str | Path, *, output: str | Path, overwrite: bool = False) -
     check_outputs([output], overwrite=overwrite, inputs=usual_files(folder))
     run = read_run_folder(folder)
     page = report_page(run, _cell(run))
-    publish(output, [page.encode()], overwrite=overwrite)
+    # JSON can spell halves of letters, which UTF-8 cannot.
+    publish(output, [page.encode(errors="backslashreplace")], overwrite=overwrite)
     return output
 
 

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final
 
+from reachmap.disk import recorded_name
 from reachmap.errors import GraspListError, SettingsError
 from reachmap.ranking.lists.arrays import GraspList, arrays_from_document
 from reachmap.ranking.lists.document import FORMAT, check_document
@@ -50,7 +51,7 @@ def read_grasps(
     GraspListError
         The file cannot be read, or it holds mistakes: one line each.
     """
-    source = "standard input" if str(path) == STDIN else str(path)
+    source = "standard input" if str(path) == STDIN else recorded_name(str(path))
     if source_format is not None and source_format not in FORMATS:
         raise SettingsError(f"unknown format {source_format!r}: {', '.join(FORMATS)}")
     data = _read_bytes(path, source)
