@@ -22,6 +22,10 @@ from reachmap.validation.planning import PickContext
 
 DEEP = (
     "bin.carrier=KLT-6147",
+    "roadmap.max_checks=2000",
+    "roadmap.sample_checks=4000",
+    "roadmap.route_plans=4",
+    "roadmap.route_rounds=1",
     "bin_scan.grid=[3,2]",
     "bin_scan.repeats=1",
     "bin_scan.orientations={family: cone, tilts_deg: [0, 30], azimuths: [1, 4], "
