@@ -117,19 +117,21 @@ def test_a_free_roll_finds_the_turn_that_fits() -> None:
         assert not room.is_there(queries(point - [0, 0, 0.03], tool, free=True))[0]
 
 
-def room_map(width_m: float) -> Any:
-    """A map with cycles, and a part so wide whose depth is 40 mm below the cup."""
+def room_map(width_m: float, *touch: str, depth_m: float = 0.04) -> Any:
+    """A map with cycles, and a part so wide that hangs so far below the cup."""
     bin_map = with_cycles(shape=(1, 5, 7, 1, 2))
     cell = json.dumps(
         {
             "bin": {"inner": [0.36, 0.26, 0.15], "inner_top": None, "mesh": None},
+            "part": "plate",
+            "parts": {"plate": {"touch": touch}},
             "lift": {"contact_allowance_m": ALLOWANCE},
             "collision": {"safety_margin_m": MARGIN},
         }
     )
     return dataclasses.replace(
         bin_map,
-        part_corners=SIGNS * [width_m, width_m, 0.04] + [0, 0, 0.02],
+        part_corners=SIGNS * [width_m, width_m, depth_m] + [0, 0, depth_m / 2],
         provenance=dataclasses.replace(bin_map.provenance, cell_resolved_json=cell),
     )
 
@@ -150,6 +152,19 @@ def test_a_part_that_would_be_in_the_bottom_is_no_cycle() -> None:
     assert status_name(ranking.status[1]) == "part_in_collision"
     paper = Ranker(bin_map).rank(point - 0.03 * up, axis)
     assert np.isfinite(paper.cost[0])
+
+
+def test_walls_that_may_be_touched_leave_room() -> None:
+    """A part too wide for a place beside a wall has none, unless it may touch it."""
+    bin_map = room_map(0.08, depth_m=0.02)
+    whole = np.isfinite(bin_map.cycle.cycle_time)
+    at = np.argwhere(whole & (np.arange(whole.shape[1]) == 0)[:, None, None])[0]
+    axis = Rotation.from_quat(
+        bin_map.quaternion_wxyz[tuple(at)], scalar_first=True
+    ).as_matrix()[:, 2]
+    for one, reached in ((bin_map, False), (room_map(0.08, "bin", depth_m=0.02), True)):
+        ranking = Ranker(one).rank(one.position[tuple(at[:3])], axis, cost="cycle")
+        assert np.isfinite(ranking.cost[0]) == reached
 
 
 def test_a_grasp_beside_a_wall_is_told_by_those_that_have_room() -> None:

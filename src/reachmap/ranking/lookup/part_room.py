@@ -10,7 +10,9 @@ the inner faces of the walls.
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -44,7 +46,7 @@ class PartRoom:
     inner : array, shape (3,)
         Inner x and y at the bottom, and depth [m].
     top : array, shape (2,)
-        Inner x and y at the rim [m]; inf where the walls are not known.
+        Inner x and y at the rim [m]; inf where walls are not known, or may be touched.
     allowance_m, margin_m : float
         How deep the part may be in the bottom, and its least distance to a wall.
     """
@@ -67,7 +69,7 @@ class PartRoom:
             cell = json.loads(bin_map.provenance.cell_resolved_json)
             spec = cell["bin"]
             inner = np.array(spec["inner"], float)
-            known = spec["mesh"] is None
+            known = spec["mesh"] is None and "bin" not in _part_of(cell)["touch"]
             top = np.array(spec["inner_top"] or inner[:2], float)
             return cls(
                 corners=corners,
@@ -122,6 +124,14 @@ class PartRoom:
                 beyond = sign * corners[..., axis] - half
                 room &= _greatest_below(beyond, z, depth + self.margin_m) <= 0.0
         return np.asarray(room)
+
+
+def _part_of(cell: Mapping[str, Any]) -> Mapping[str, Any]:
+    """The part of a resolved cell: its own, one of several by name, or the first."""
+    part, parts = cell["part"], cell["parts"]
+    if isinstance(part, dict):
+        return part
+    return dict(parts[part or next(iter(parts))])
 
 
 def _greatest_below(values: FloatArray, z: FloatArray, limit: float) -> FloatArray:
