@@ -11,6 +11,7 @@ from reachmap.core.collision.held_part import HeldPart
 from reachmap.maps import Status, read_bin_map
 from reachmap.maps.parts import StageStatus
 from reachmap.runtime.options import RunOptions
+from reachmap.scans.cycle.stages import places_among
 from reachmap.tools.bin_scan import bin_scan
 from reachmap.tools.merge import merge
 from tests.support.cycle_replay import faults_of_cycle, paths_by_stage
@@ -75,6 +76,17 @@ def test_shards_make_the_same_map(tmp_path, conveyor):
     merge(shards, output=tmp_path / "whole.h5")
     merged = read_bin_map(tmp_path / "whole.h5")
     assert merged.stamp.content_sha256 == conveyor.stamp.content_sha256
+
+
+def test_lifts_keep_to_their_goals_when_others_are_added():
+    """Behind those of the same frame, as a stable sort puts them."""
+    rng = np.random.default_rng(3)
+    frame = np.sort(rng.integers(0, 6, 12))
+    added = rng.integers(0, 8, 9)
+    both = np.concatenate([frame, added])
+    order = np.argsort(both, kind="stable")
+    places = places_among(frame, both[order])
+    np.testing.assert_array_equal(order[places], np.arange(len(frame)))
 
 
 @pytest.mark.slow

@@ -91,7 +91,7 @@ def _with_more_rolls(
         if not len(wanted):
             break
         more = rolls.add_turns(survey, wanted, turns)
-        old = _places_among(survey.frame, more.frame)
+        old = places_among(survey.frame, more.frame)
         rows = np.setdiff1d(np.arange(len(more.frame)), old)
         found = lift_in_stages(
             scenes.empty.loaded, more, rows, body_pairs, stages, f"lift_{number}"
@@ -101,7 +101,7 @@ def _with_more_rolls(
     return survey, lifts
 
 
-def _places_among(frame: IntArray, more: IntArray) -> IntArray:
+def places_among(frame: IntArray, more: IntArray) -> IntArray:
     """Where goals are after others were added behind those of their frames."""
     number = np.arange(len(frame)) - np.searchsorted(frame, frame)
     return np.asarray(np.searchsorted(more, frame) + number)
