@@ -210,11 +210,14 @@ def _legend(
     ]
     orders = [terms[:top] for g in groups for terms in (g.supplied, g.ranked)]
     if any(np.isnan(terms).any() for terms in orders):
+        # Short where there are many others: two rows of five have to fit.
+        label = "unreachable" if len(handles) > 5 else "unreachable grasps"
         handles.append(
-            Patch(color=NOT_ATTEMPTED, label="unreachable grasps: the mean is infinite")
+            Patch(color=NOT_ATTEMPTED, label=f"{label}: the mean is infinite")
         )
+    ncols = len(handles) if len(handles) < 7 else -(-len(handles) // 2)
     figure.legend(
-        handles=handles, loc="lower left", ncols=min(len(handles), 6), labelcolor=MUTED,
+        handles=handles, loc="lower left", ncols=ncols, labelcolor=MUTED,
         bbox_to_anchor=(left, 0.01), borderaxespad=0.0, columnspacing=1.2,
         handlelength=1.1, fontsize=7.4,
     )  # fmt: skip
