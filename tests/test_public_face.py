@@ -5,8 +5,12 @@ from __future__ import annotations
 import inspect
 import subprocess
 import sys
+from pathlib import Path
 
 import reachmap
+from reachmap.maps import write_bin_map
+from reachmap.motions.motion import best_rows
+from tests.support.toy_artefacts import toy_bin_map
 
 
 def test_every_public_name_is_there_and_is_what_its_home_defines() -> None:
@@ -53,3 +57,20 @@ def test_paths_may_be_text_everywhere() -> None:
         and "str" not in str(parameter.annotation)
     ]
     assert not strict
+
+
+def test_what_is_typed_into_a_prompt_answers_in_a_line(tmp_path: Path) -> None:
+    """Arrays and whole cells are not spelt out."""
+    record = toy_bin_map()
+    write_bin_map(tmp_path / "bin.h5", record)
+    library = reachmap.MotionLibrary.from_map(tmp_path / "bin.h5")
+    place, _ = next(iter(best_rows(record).items()))
+    served = library.serve(
+        record.position[place[:3]], quaternion_wxyz=record.quaternion_wxyz[place]
+    )
+    ranker = reachmap.Ranker.from_map(tmp_path / "bin.h5")
+    ranking = ranker.rank(record.position[0, 0, :2], [[1.0, 0.0, 0.0]] * 2)
+    loaded = reachmap.load_cell("planar-toy")
+    for value in (library, served, ranker, ranking, loaded, library.scenes[0]):
+        assert repr(value).startswith(f"<{type(value).__name__}: ")
+        assert len(repr(value)) < 100

@@ -28,12 +28,19 @@ if TYPE_CHECKING:
     from reachmap.tools.bin_scan import bin_scan
     from reachmap.tools.check import check
     from reachmap.tools.compare import compare
+    from reachmap.tools.empty import empty
+    from reachmap.tools.export import export
     from reachmap.tools.heatmap import heatmap
     from reachmap.tools.info import info
     from reachmap.tools.merge import merge
     from reachmap.tools.new_cell import new_cell
     from reachmap.tools.place_bin import place_bin
+    from reachmap.tools.place_bins import place_bins
+    from reachmap.tools.place_robot import place_robot
     from reachmap.tools.rank import rank
+    from reachmap.tools.robust import robust
+    from reachmap.tools.run import run_pipeline
+    from reachmap.tools.study import study
     from reachmap.tools.validate import validate
     from reachmap.tools.verify import verify
     from reachmap.tools.workspace_scan import workspace_scan
@@ -56,14 +63,21 @@ _HOMES: Final[dict[str, str]] = {
     "bin_scan": "tools.bin_scan",
     "check": "tools.check",
     "compare": "tools.compare",
+    "empty": "tools.empty",
+    "export": "tools.export",
     "heatmap": "tools.heatmap",
     "info": "tools.info",
     "load_cell": "cell.loading:read_cell",
     "merge": "tools.merge",
     "new_cell": "tools.new_cell",
     "place_bin": "tools.place_bin",
+    "place_bins": "tools.place_bins",
+    "place_robot": "tools.place_robot",
     "rank": "tools.rank",
     "read_map": "maps.format.registry:read_artefact",
+    "robust": "tools.robust",
+    "run_pipeline": "tools.run",
+    "study": "tools.study",
     "validate": "tools.validate",
     "verify": "tools.verify",
     "workspace_scan": "tools.workspace_scan",
@@ -87,14 +101,21 @@ __all__ = [
     "bin_scan",
     "check",
     "compare",
+    "empty",
+    "export",
     "heatmap",
     "info",
     "load_cell",
     "merge",
     "new_cell",
     "place_bin",
+    "place_bins",
+    "place_robot",
     "rank",
     "read_map",
+    "robust",
+    "run_pipeline",
+    "study",
     "validate",
     "verify",
     "workspace_scan",

@@ -71,6 +71,9 @@ class LoadedCell:
     joint_limits: Mapping[str, MoveItLimits] = dataclasses.field(default_factory=dict)
     warnings: tuple[str, ...] = ()
 
+    def __repr__(self) -> str:
+        return f"<LoadedCell: {self.cell.name}, contents {self.sha256[:12]}>"
+
     @property
     def resolver(self) -> Resolver:
         """Looks up references of the cell file."""

@@ -69,6 +69,10 @@ class Scene:
     with_bin: bool
     load: Load = "empty"
 
+    def __repr__(self) -> str:
+        with_bin = "with its bin" if self.with_bin else "without a bin"
+        return f"<Scene: {self.loaded.cell.name}, {self.robot.dof} joints, {with_bin}>"
+
     @classmethod
     def build(
         cls,

@@ -86,6 +86,10 @@ class ServedMotion:
     verified: bool
     _limits: tuple[FloatArray, FloatArray] = field(repr=False)
 
+    def __repr__(self) -> str:
+        how = "verified" if self.verified else "not verified"
+        return f"<ServedMotion: on the path to test grasp {self.test_grasp}, {how}>"
+
     @cached_property
     def motion(self) -> Motion:
         """The motion with times within the limits of the joints."""
@@ -125,6 +129,11 @@ class MotionLibrary:
         self._rows = rows.reshape(len(self.table.points), -1)
         robot = self.scenes[0].robot
         self._limits = robot.velocity_rad_s, robot.acceleration_rad_s2
+
+    def __repr__(self) -> str:
+        paths = int((self._rows >= 0).sum())
+        sha256 = self._map.stamp.content_sha256
+        return f"<MotionLibrary: map {sha256[:12]}, paths to {paths} test grasps>"
 
     @classmethod
     def from_map(

@@ -16,6 +16,7 @@ from reachmap.cell.loading import stored_cell
 from reachmap.cell.meshes.reading import MeshError, read_mesh
 from reachmap.cell.model.cell import Cell
 from reachmap.cell.model.shapes import sides
+from reachmap.disk import as_path
 from reachmap.errors import SettingsError
 from reachmap.maps import BinMap, check_outputs, publish, read_bin_map
 from reachmap.maps.bytes.publish import check_picture
@@ -124,15 +125,15 @@ def _parts(one: SimulatedHeap) -> list[dict[str, Any]]:
 
 
 def empty(
-    map_path: Path,
+    map_path: str | Path,
     *,
-    part: tuple[float, float, float] | Path | None = None,
+    part: tuple[float, float, float] | str | Path | None = None,
     fill: float = FILL,
     heaps: int = HEAPS,
     order: Order = "highest",
     seed: int | None = None,
-    output: Path | None = None,
-    picture: Path | None = None,
+    output: str | Path | None = None,
+    picture: str | Path | None = None,
     overwrite: bool = False,
 ) -> EmptyAnswer:
     """Fill a bin with parts at random and pick them to the end, with the map alone.
@@ -164,6 +165,8 @@ def empty(
         The part does not fit, or there is none.
     MapFileError, OutputError
     """
+    map_path, output, picture = Path(map_path), as_path(output), as_path(picture)
+    part = Path(part) if isinstance(part, str) else part
     if order not in ORDERS:
         raise SettingsError(f"--order {order!r}: expected {' or '.join(ORDERS)}")
     if not 0 < fill <= 1:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from reachmap.cell.loading import stored_cell
+from reachmap.disk import as_path
 from reachmap.errors import SceneError, SettingsError
 from reachmap.maps import (
     BinPlacement,
@@ -58,13 +59,13 @@ def named_output(path: Path, name: str) -> Path:
 
 
 def place_bins(
-    workspace: Path,
-    output: Path,
+    workspace: str | Path,
+    output: str | Path,
     *,
     choice: PlacementChoice | None = None,
     overrides: Sequence[str] = (),
     seed: int | None = None,
-    picture: Path | None = None,
+    picture: str | Path | None = None,
     run: RunOptions = IN_PROCESS,
 ) -> dict[str, BinPlacement]:
     """Choose a place for each of several bins.
@@ -92,6 +93,7 @@ def place_bins(
     ReachmapError
         See :mod:`reachmap.errors`; the bin is named.
     """
+    workspace, output, picture = Path(workspace), Path(output), as_path(picture)
     choice = choice or PlacementChoice()
     check_choice(choice)
     names = bin_names(workspace)

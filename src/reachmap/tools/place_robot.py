@@ -20,6 +20,7 @@ from reachmap.cell.fragments import fragment_overrides
 from reachmap.cell.loaded import LoadedCell
 from reachmap.cell.loading import cell_path, read_cell
 from reachmap.core.kinematics.kinematics import Kinematics
+from reachmap.disk import as_path
 from reachmap.errors import SettingsError
 from reachmap.maps import RunClock, check_outputs
 from reachmap.maps.base.format import write_base
@@ -86,20 +87,20 @@ class RobotChoice:
 
 
 def place_robot(
-    cell: str,
-    output: Path,
+    cell: str | Path,
+    output: str | Path,
     *,
     choice: RobotChoice | None = None,
     overrides: Sequence[str] = (),
     seed: int | None = None,
-    picture: Path | None = None,
+    picture: str | Path | None = None,
     run: RunOptions = IN_PROCESS,
 ) -> BasePlacement:
     """Choose where the arm stands for a bin that is fixed in the world.
 
     Parameters
     ----------
-    cell : str
+    cell : str or Path
         Shipped name or path.
     output : Path
         The artefact to write.
@@ -116,6 +117,7 @@ def place_robot(
     ReachmapError
         See :mod:`reachmap.errors`.
     """
+    cell, output, picture = str(cell), Path(output), as_path(picture)
     choice = choice or RobotChoice()
     _check(choice)
     check_picture(picture, "--picture")

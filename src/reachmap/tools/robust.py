@@ -9,6 +9,7 @@ import numpy as np
 
 from reachmap._typing import BoolArray, CodeArray, IntArray
 from reachmap.core.collision.misplacement import Misplacement
+from reachmap.disk import as_path
 from reachmap.errors import SettingsError
 from reachmap.maps import (
     BinMap,
@@ -35,14 +36,14 @@ MAX_SHIFT_M, MAX_TURN_RAD = 0.5, np.radians(45.0)
 
 
 def robust(
-    map_path: Path,
-    output: Path,
+    map_path: str | Path,
+    output: str | Path,
     *,
     errors: Errors,
     samples: int = DEFAULT_SAMPLES,
     margin_m: float = 0.0,
     seed: int | None = None,
-    picture: Path | None = None,
+    picture: str | Path | None = None,
     run: RunOptions = IN_PROCESS,
 ) -> Robustness:
     """Say which test grasps stay reachable when bin, camera or tool are off.
@@ -72,6 +73,7 @@ def robust(
     ReachmapError
         See :mod:`reachmap.errors`.
     """
+    map_path, output, picture = Path(map_path), Path(output), as_path(picture)
     _check(errors, samples, margin_m)
     check_picture(picture, "--picture")
     check_outputs([output, picture], overwrite=run.overwrite, inputs=[map_path])

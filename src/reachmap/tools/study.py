@@ -54,8 +54,8 @@ REQUIREMENT = re.compile(
 
 
 def study(
-    cell: str,
-    output: Path,
+    cell: str | Path,
+    output: str | Path,
     *,
     vary: Sequence[str],
     samples: int | None = None,
@@ -103,6 +103,7 @@ def study(
         See :mod:`reachmap.errors`. A variant whose cell is wrong is a row with a
         cause, unless all are.
     """
+    cell, output = str(cell), Path(output)
     if run.shard is not None:
         raise SettingsError("--shard: a study is shared out by its workers")
     requirements = tuple(_requirement(text) for text in require)

@@ -75,6 +75,9 @@ class Ranking:
     def __post_init__(self) -> None:
         freeze(self)
 
+    def __repr__(self) -> str:
+        return f"<Ranking: {len(self.order)} grasps, {self.reachable.sum()} reachable>"
+
     @property
     def rank(self) -> IntArray:
         """Rank of each grasp, from 1, in supplied order; shape (n,)."""

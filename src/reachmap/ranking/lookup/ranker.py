@@ -110,6 +110,11 @@ class Ranker:
         self.stamp: Stamp = bin_map.stamp
         self._tree = NearestPoints(self.table.points)
 
+    def __repr__(self) -> str:
+        known = "calibrated" if self.calibration else "not calibrated"
+        sha256, tests = self.stamp.content_sha256[:12], self.table.reachable.size
+        return f"<Ranker: map {sha256}, {tests} test grasps, {known}>"
+
     @cached_property
     def cost_table_sha256(self) -> str:
         """Hash of what costs are looked up in; see :meth:`GraspTable.sha256`."""
