@@ -14,8 +14,8 @@ PAGE = ROOT / "docs" / "how-to" / "own-robot.md"
 # Names, numbers and what is left out stand for whatever a message names; a colon joins
 # a place and what is wrong there.
 FILLED_IN = re.compile(
-    r"…|;|: |'[^']*'|\d+(?:\.\d+)?|\+x"
-    r"|\b(?:FOLDER|X|A|B|j|ur_typ|tool0|velocity|acceleration)\b"
+    r"…|;|: |'[^']*'|\d+(?:\.\d+)?%?|\+x"
+    r"|\b(?:FOLDER|X|A|B|j|ur_typ|tool0|velocity|acceleration|floating)\b"
 )
 
 
