@@ -19,6 +19,7 @@ import json
 import os
 import resource
 import shlex
+import signal
 import subprocess
 import sys
 import tempfile
@@ -158,7 +159,10 @@ def outcome(row: dict[str, object]) -> str:
         return "0 % with a reason" if "bin-scan said" in row else "0 % IN SILENCE"
     codes = row["exit"]
     assert isinstance(codes, dict)
-    return "refused" if codes.get(str(row["step"])) == 2 else "FAILED"
+    code = codes.get(str(row["step"]))
+    if code == -signal.SIGXCPU:
+        return f"stopped after {CPU_S} s"
+    return "refused" if code == 2 else "FAILED"
 
 
 def table(rows: list[dict[str, object]]) -> str:
