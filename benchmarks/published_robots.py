@@ -77,7 +77,7 @@ def run(*arguments: str, folder: Path, row: dict[str, object]) -> str:
         capture_output=True,
         text=True,
         check=False,
-        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_CPU, (CPU_S, CPU_S)),
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_CPU, (CPU_S, CPU_S + 5)),
     )
     codes = row.setdefault("exit", {})
     assert isinstance(codes, dict)

@@ -6,9 +6,11 @@ from itertools import pairwise
 
 import pytest
 
+from reachmap.cell.files.moveit_config import planning_group
 from reachmap.cell.files.resources import data_folder
+from reachmap.cell.files.srdf import parse_srdf
 from reachmap.cell.files.urdf import UrdfDescription, parse_urdf
-from reachmap.cell.guesses import guess_base, guess_tip, other_tips
+from reachmap.cell.guesses import finger_joints, guess_base, guess_tip, other_tips
 
 
 def robot(*joints: str, arm: int = 6) -> UrdfDescription:
@@ -92,6 +94,22 @@ def test_the_planning_group_says_which_joints() -> None:
     found = robot("l3>side_tool0 fixed", "l6>tool0 fixed")
     assert guess_tip(found, "l0", ["j_l1", "j_l2", "j_l3"]) == "side_tool0"
     assert guess_tip(found, "l0", ["j_l3", "j_l4"]) == "l4"
+
+
+def test_no_planning_group_with_fingers_is_the_arm() -> None:
+    """Arm and hand together are a longer chain where one finger follows the other."""
+    grip = ("l6>hand fixed", "hand>a prismatic", "hand>b prismatic j_a")
+    found = robot(*grip)
+    srdf = """<robot name="r">
+    <group name="arm"><chain base_link="l0" tip_link="l6"/></group>
+    <group name="hand"><joint name="j_a"/></group>
+    <group name="arm_hand"><group name="arm"/><group name="hand"/></group>
+    </robot>"""
+    groups = parse_srdf(srdf, "r.srdf", found)
+    fingers = finger_joints(found, "l0")
+    assert planning_group(found, groups, fingers) == tuple(
+        f"j_l{k}" for k in range(1, 7)
+    )
 
 
 @pytest.mark.parametrize(

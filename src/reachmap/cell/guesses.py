@@ -86,6 +86,11 @@ def guess_tip(robot: UrdfDescription, base: str, joints: Collection[str] = ()) -
     return _flange_beyond(last, arms)
 
 
+def finger_joints(robot: UrdfDescription, base: str) -> set[str]:
+    """Joints that open and close a hand rather than move it."""
+    return _Tree.of(robot, base).fingers()
+
+
 def other_tips(robot: UrdfDescription, base: str, tip: str) -> list[str]:
     """Say which arms a robot has beside the one that ends at ``tip``."""
     tree = _Tree.of(robot, base)

@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 
 from reachmap._typing import FloatArray
+from reachmap.cell import guesses
 from reachmap.cell.files.moveit_config import planning_group
 from reachmap.cell.files.srdf import srdf_text
 from reachmap.cell.files.urdf import UrdfDescription
-from reachmap.cell.guesses import guess_base, guess_tip, is_tool_point, other_tips
 from reachmap.cell.loading import LoadedCell, cell_from_text, check_storable
 from reachmap.cell.starter import (
     BINS_M,
@@ -131,7 +131,9 @@ def new_cell(
     check_output(target, overwrite=overwrite, inputs=inputs)
     attempt = _Attempt(folder, source, _first_choices(source, base, tip))
     if tip is None and source.moveit is None:
-        others = other_tips(source.robot, attempt.choices.base, attempt.choices.tip)
+        others = guesses.other_tips(
+            source.robot, attempt.choices.base, attempt.choices.tip
+        )
         attempt.notes += others
     problems = attempt.refine()
     choices = attempt.choices
@@ -162,10 +164,13 @@ def _first_choices(
         if link is not None and link not in robot.links:
             hint = did_you_mean(link, robot.links)
             raise SettingsError(f"{source.label}: no link {link!r}; {hint}")
-    chosen_base = base or guess_base(robot)
-    group = () if source.moveit is None else planning_group(robot, source.moveit)
+    chosen_base = base or guesses.guess_base(robot)
+    group: tuple[str, ...] = ()
+    if source.moveit is not None:
+        fingers = guesses.finger_joints(robot, chosen_base)
+        group = planning_group(robot, source.moveit, fingers)
     group = tuple(n for n in group if base is None or n in _below(robot, chosen_base))
-    chosen_tip = tip or guess_tip(robot, chosen_base, group)
+    chosen_tip = tip or guesses.guess_tip(robot, chosen_base, group)
     chain = robot.chain(chosen_base, chosen_tip)
     names = [n for n in chain if tip or not group or n in group]
     if not names:
@@ -287,7 +292,7 @@ class _Attempt:
             guess = guess_bin(
                 Scene.build(self._loaded(), bin_moves=True),
                 T_base_tcp,
-                with_tool=not is_tool_point(tip),
+                with_tool=not guesses.is_tool_point(tip),
             )
             if guess is not None and (best is None or guess.share > best.share):
                 best, chosen = guess, self.choices

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -79,11 +79,18 @@ def _the_srdf(folder: Path, places: Sequence[Path], robot: str) -> Path | None:
     return None
 
 
-def planning_group(robot: UrdfDescription, srdf: SrdfDescription) -> tuple[str, ...]:
-    """Joints of the SRDF's group that is the arm: its longest single chain."""
+def planning_group(
+    robot: UrdfDescription, srdf: SrdfDescription, fingers: Collection[str]
+) -> tuple[str, ...]:
+    """Joints of the SRDF's group that is the arm: its longest single chain.
+
+    Groups with fingers are those of the arm together with its hand.
+    """
     chains = [tuple(robot.chain(robot.root, link)) for link in robot.links]
     best: tuple[str, ...] = ()
     for joints in srdf.groups.values():
+        if not set(fingers).isdisjoint(joints):
+            continue
         ordered = next(
             (
                 tuple(name for name in chain if name in joints)
