@@ -54,7 +54,8 @@ def compare_many_text(comparisons: MapComparisons) -> str:
         )
     lines = [
         *table_lines(rows, "<>>>>>><"),
-        "McNemar, false-discovery rate 5 % over all; two maps give causes and squares",
+        "paired test by places, false-discovery rate 5 % over all; two maps also give "
+        "causes and squares",
     ]
     for item in comparisons.each:
         lines += ["", item.names[1], *_cell_lines(item.result.cell_changes)[1:]]
@@ -81,7 +82,11 @@ def _count_facts(r: Comparison) -> list[tuple[str, str]]:
             f"{poses}, by pose in {r.frame} within {1000 * r.tolerance_m:g} mm and "
             f"{r.tolerance_deg:g} deg",
         ),
-        ("gained, lost", f"{r.gained}, {r.lost} (McNemar {p_text(r.p_value)})"),
+        ("gained, lost", f"{r.gained}, {r.lost} ({p_text(r.p_value)} by places)"),
+        (
+            "change",
+            f"{r.change:+.2f} points ({r.change_low:+.2f} … {r.change_high:+.2f})",
+        ),
     ]
     if not np.isnan(r.path_length_before):
         facts.append(

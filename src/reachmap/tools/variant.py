@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import hashlib
-import json
 import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -12,6 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from reachmap.cell.loading import LoadedCell
+from reachmap.core.memo import Memo, fingerprint
+from reachmap.core.scene import Scene
 from reachmap.errors import ReachmapError
 from reachmap.maps import BinMap, RunInfo, WorkspaceMap, write_workspace_map
 from reachmap.maps.format.bin import tree_from_bin_map
@@ -26,7 +26,9 @@ from reachmap.tools.workspace_scan import workspace_work
 
 OF_WORKSPACE = frozenset({"level_average"})
 # A workspace map is made without the bin, whatever is to be done with it later.
-NOT_OF_WORKSPACE = ("bin", "bin_scan", "placement", "parameters", "expressions")
+NOT_OF_WORKSPACE = ("bin", "bin_scan", "placement")
+# What earlier variants have found, in this process.
+_MEMO = Memo()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -69,26 +71,28 @@ def needs_workspace(objectives: Sequence[str], *, places_bin: bool) -> bool:
 
 def workspace_key(loaded: LoadedCell) -> str:
     """Equal for cells whose workspace maps have the same frames and results."""
-    data = json.loads(loaded.resolved_json)
-    for name in NOT_OF_WORKSPACE:
-        data.pop(name, None)
-    files = dict(sorted(loaded.files_sha256.items()))
-    text = json.dumps([data, loaded.urdf, loaded.srdf, files], sort_keys=True)
-    return hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()
+    return fingerprint(loaded, without=NOT_OF_WORKSPACE)
 
 
 def map_workspace(context: Any, loaded: LoadedCell) -> dict[str, Any]:
     """Results of the test frames of a workspace map, or why there are none."""
     try:
-        return {"cause": "", "payloads": payloads_in_place(workspace_work(loaded))}
+        with _MEMO.at_work():
+            payloads = payloads_in_place(
+                workspace_work(loaded),
+                Scene.shared(loaded, with_bin=False),
+                NOT_OF_WORKSPACE,
+            )
     except ReachmapError as error:
         return {"cause": _cause(error), "payloads": []}
+    return {"cause": "", "payloads": payloads}
 
 
 def compute_variant(context: VariantContext, unit: VariantUnit) -> dict[str, Any]:
     """Map a variant; what is wrong with it is a result, too."""
     try:
-        return _computed(context, unit)
+        with _MEMO.at_work():
+            return _computed(context, unit)
     except ReachmapError as error:
         return failure(_cause(error))
 
@@ -170,7 +174,7 @@ def _placed(workspace: WorkspaceMap) -> tuple[LoadedCell, str]:
 
 def _bin_map(loaded: LoadedCell, source_sha256: str) -> BinMap:
     work = bin_scan_work(loaded, source_sha256)
-    payloads = payloads_in_place(work)
+    payloads = payloads_in_place(work, Scene.shared(loaded, with_bin=True))
     record: BinMap = work.kind.assemble(work.document, payloads, run=RunInfo())
     return record
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 
 import coal
 import numpy as np
@@ -17,11 +18,13 @@ from reachmap.core.collision.static_bodies import (
     PlacedBody,
     bodies_at,
 )
+from reachmap.core.collision.trace import Trace
 from reachmap.geometry import inverse_transform, transform_from_parts
 
 if TYPE_CHECKING:
     from reachmap.cell.loading import LoadedCell
     from reachmap.core.robot.model import RobotModel
+    from reachmap.core.scene import Scene
 
 LENS_RADIUS_M = 0.001
 
@@ -93,6 +96,14 @@ class Camera:
         corners : array, shape (n, 3)
             robot_base [m].
         """
+        found = self._hidden_by(q, T_base_camera, corners)
+        if Trace.current is not None:
+            Trace.current.note_other(_hidden_in, found, q, T_base_camera, corners)
+        return found
+
+    def _hidden_by(
+        self, q: FloatArray, T_base_camera: FloatArray, corners: FloatArray
+    ) -> str:
         lens = T_base_camera[:3, 3]
         cone = convex_hull(np.vstack([lens, corners]))
         bodies = [
@@ -118,6 +129,10 @@ class Camera:
             if _solid(body.geometry).first_touched(lens, place) >= 0:
                 found.add(index)
         return found
+
+
+def _hidden_in(scene: Scene) -> Callable[..., Any]:
+    return Camera(scene.robot, scene.loaded).hidden_by
 
 
 def _solid(shape: object) -> PlacedBodies:

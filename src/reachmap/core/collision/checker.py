@@ -19,11 +19,12 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from reachmap._typing import BoolArray, FloatArray
+from reachmap._typing import BoolArray, FloatArray, IntArray
 from reachmap.core.collision.bodies import BodyGeometry
 from reachmap.core.collision.displacement import MotionBound
 from reachmap.core.collision.never_meet import PairMotion, pairs_that_never_meet
 from reachmap.core.collision.shapes import convex_hull
+from reachmap.core.collision.trace import FREE, TOUCHING, Trace
 from reachmap.core.robot.chain import SerialChain
 
 if TYPE_CHECKING:
@@ -168,13 +169,16 @@ class CollisionChecker:
     def is_free(self, q: FloatArray) -> bool:
         """Whether all pairs are further apart than the safety margin."""
         self.checks += 1
-        return not pin.computeCollisions(
+        free = not pin.computeCollisions(
             self._model,
             self._data,
             self._broadphase,
             self.robot.body_configuration(q),
             True,
         )
+        if Trace.current is not None:
+            Trace.current.note(self, FREE, q, free)
+        return free
 
     def is_clear(self, q: FloatArray, distance_m: float) -> bool:
         """Whether the robot may move by a distance from q, whichever way.
@@ -183,17 +187,36 @@ class CollisionChecker:
         brings a pair closer than the safety margin. False says nothing; the answer is
         conservative, as it uses convex hulls and the next wider step of the ladder.
         """
-        for step, manager, _ in self._ladder:
+        for rung, (step, _, _) in enumerate(self._ladder):
             if step >= distance_m:
-                self.checks += 1
-                return not pin.computeCollisions(
-                    self._model,
-                    self._data,
-                    manager,
-                    self.robot.body_configuration(q),
-                    True,
-                )
+                return self._is_clear_at(rung, q)
         return False
+
+    def _is_clear_at(self, rung: int, q: FloatArray) -> bool:
+        self.checks += 1
+        clear = not pin.computeCollisions(
+            self._model,
+            self._data,
+            self._ladder[rung][1],
+            self.robot.body_configuration(q),
+            True,
+        )
+        if Trace.current is not None:
+            Trace.current.note(self, rung, q, clear)
+        return clear
+
+    def asked(self, about: int, q: FloatArray) -> Any:
+        """Answer what a trace has noted: FREE, TOUCHING or a rung of the ladder."""
+        if about == TOUCHING:
+            return self.touching_pairs(q)
+        return self.is_free(q) if about == FREE else self._is_clear_at(about, q)
+
+    def widest_margin_m(self, about: IntArray) -> FloatArray:
+        """How near two bodies have to be to matter to what was asked, shape (n,)."""
+        steps = np.array([*LADDER_M, 0.0])[np.maximum(about, FREE)]
+        return np.asarray(
+            self.safety_margin_m + steps * self._shares.max(initial=1.0), float
+        )
 
     def free_mask(self, Q: FloatArray) -> BoolArray:
         """:meth:`is_free` of many configurations, shape (n, dof) to (n,)."""
@@ -211,7 +234,10 @@ class CollisionChecker:
             for index, result in enumerate(data.collisionResults)
             if result.isCollision()
         ]
-        return tuple(dict.fromkeys(hits))
+        touching = tuple(dict.fromkeys(hits))
+        if Trace.current is not None:
+            Trace.current.note(self, TOUCHING, q, touching)
+        return touching
 
     def blocking_pair(self, q: FloatArray) -> int:
         """Index into ``body_pairs`` of a pair that touches at q, or -1."""

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pinocchio as pin
 
 from reachmap._typing import BoolArray, FloatArray, IntArray
 from reachmap.core.collision.checker import CollisionChecker, guess_nothing
+from reachmap.core.collision.trace import Trace
 from reachmap.geometry import pieces
+
+if TYPE_CHECKING:
+    from reachmap.core.scene import Scene
 
 TOLERANCE_M, TOLERANCE_SHARE = 1e-3, 0.1
 """By how much, or by what share of itself if that is more, a clearance may be greater
@@ -73,6 +78,12 @@ class ClearanceMeter:
         pair : int
             Index into the checker's ``body_pairs``, -1 where there are none.
         """
+        found = self._of_path(path, among)
+        if Trace.current is not None:
+            Trace.current.note_other(_of_path_in, found, path.copy(), among)
+        return found
+
+    def _of_path(self, path: FloatArray, among: BoolArray | None) -> tuple[float, int]:
         count = len(self._bodies.collisionPairs)
         pairs = np.arange(count) if among is None else np.flatnonzero(among)
         if len(pairs) == 0:
@@ -187,6 +198,10 @@ class ClearanceMeter:
             is not type(self._hulls.geometryObjects[body].geometry)
             for body in (pair.first, pair.second)
         )
+
+
+def _of_path_in(scene: Scene) -> Callable[..., Any]:
+    return ClearanceMeter(scene.checker).of_path
 
 
 def _at(values: FloatArray, place: FloatArray) -> FloatArray:

@@ -109,6 +109,29 @@ class MotionBound:
         moved = np.minimum(first[:, on_chain] + turned * reach, reach)
         return np.asarray(np.where(self._beside, reach, moved))
 
+    def boxes(self, Q: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Boxes around the bodies of each joint, in robot_base.
+
+        Without bounds where bodies move beside the chain.
+
+        Parameters
+        ----------
+        Q : array, shape (n, dof)
+
+        Returns
+        -------
+        low, high : array, shape (n, dof, 3)
+        """
+        frames = self._chain.joint_frames_many(Q)
+        R, origin = frames[..., :3, :3], frames[..., :3, 3]
+        centre = self._corners.mean(axis=2)
+        half = self._corners.max(axis=2) - centre
+        middle = (R @ centre[..., None])[..., 0] + origin
+        room = (np.abs(R) @ half[..., None])[..., 0]
+        if self._beside.any():
+            room = np.full_like(room, np.inf)
+        return middle - room, middle + room
+
     def _speed_m(self, Q: FloatArray, half_change: FloatArray) -> FloatArray:
         """Fastest point on each joint at the middles of motions, shape (n, dof)."""
         frames = self._chain.joint_frames_many(Q)

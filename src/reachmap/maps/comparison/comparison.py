@@ -21,8 +21,8 @@ from reachmap.maps.comparison.pose_matching import (
 )
 from reachmap.maps.comparison.significance import (
     benjamini_hochberg,
+    clustered_shares,
     fisher_exact,
-    mcnemar_exact,
 )
 from reachmap.maps.parts import freeze
 from reachmap.maps.records import BinMap, Provenance, Status, WorkspaceMap
@@ -110,7 +110,10 @@ class Comparison:
     reached_before, reached_after, gained, lost : int
         Frames with a path in each, and in one but not the other.
     p_value : float
-        Of McNemar's exact test on gained and lost.
+        Of gained and lost, with places as units; see
+        :func:`~reachmap.maps.comparison.significance.clustered_shares`.
+    change_low, change_high : float
+        95 % interval of the change [percentage points].
     path_length_before, path_length_after : float
         Mean over the frames that both reach [rad].
     squares : SquareChange
@@ -134,6 +137,8 @@ class Comparison:
     gained: int
     lost: int
     p_value: float
+    change_low: float
+    change_high: float
     path_length_before: float
     path_length_after: float
     squares: SquareChange
@@ -185,6 +190,8 @@ def compare_maps(
     was, now = a.status == Status.PATH_FOUND, b.status == Status.PATH_FOUND
     gained, lost = ~was & now, was & ~now
     both = was & now & ~np.isnan(a.path_length) & ~np.isnan(b.path_length)
+    _, place = np.unique(np.round(a.square / TOLERANCE_M), axis=0, return_inverse=True)
+    p_value, low, high = clustered_shares(gained.astype(float) - lost, place.ravel())
     return Comparison(
         kind="bin_map" if isinstance(before, BinMap) else "workspace_map",
         frame=frame,
@@ -197,7 +204,9 @@ def compare_maps(
         reached_after=int(now.sum()),
         gained=int(gained.sum()),
         lost=int(lost.sum()),
-        p_value=mcnemar_exact(int(gained.sum()), int(lost.sum())),
+        p_value=p_value,
+        change_low=100.0 * low,
+        change_high=100.0 * high,
         path_length_before=_mean(a.path_length[both]),
         path_length_after=_mean(b.path_length[both]),
         squares=_squares(a.square, was, now),

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator, Sequence
+import hashlib
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from reachmap._typing import BoolArray, FloatArray
+from reachmap.core.memo import Memo, fingerprint, remembered
 from reachmap.placement.mapped.exact import (
     ALWAYS,
     BIN_PLACING,
@@ -201,10 +204,39 @@ class Prepared:
 
     def __init__(self, context: tuple[LoadedCell, BoolArray, Placing]) -> None:
         loaded, self._is_open, self._placing = context
+        self._key = self._fingerprint(loaded)
         self._scene = self._placing.scene(loaded)
         self._samples: dict[Grid, Sample] = {}
         self._at: tuple[Grid, Pose] | None = None
         self._placed: PlacedScene | None = None
+
+    def _fingerprint(self, loaded: LoadedCell) -> str:
+        """What a score depends on besides the request and what stands around.
+
+        "" where the pose is not that of the bin: then what stands around moves.
+        """
+        if self._placing is not BIN_PLACING:
+            return ""
+        # Where the bin stands is what is asked.
+        known = fingerprint(
+            loaded, without=("bin.pose", "bin.frame", "bin.on"), surroundings=False
+        )
+        seen = hashlib.sha256(self._is_open.tobytes()).hexdigest()
+        return f"pose {known} {seen}"
+
+    def remembered(
+        self, unit: tuple[Request, float], compute: Callable[[], dict[str, Any]]
+    ) -> dict[str, Any]:
+        """Score a pose, or take it over from a cell in which the score is the same."""
+        if not self._key or Memo.current is None:
+            return compute()
+        # What is computed for a unit is asked in it.
+        self._placed = self._at = None
+        pose = unit[0].pose
+        scene = self._placing.at(
+            self._scene, self._placing.cell_at(self._scene.loaded, pose)
+        )
+        return remembered(f"{self._key} {unit}", scene, compute)
 
     def scene_at(self, pose: Pose, grid: Grid) -> PlacedScene:
         """Scene with what is placed at a pose."""
@@ -220,6 +252,10 @@ class Prepared:
 
 def evaluate_unit(prepared: Prepared, unit: tuple[Request, float]) -> dict[str, Any]:
     """Score one pose, unless its bound is not above a number [percent]."""
+    return prepared.remembered(unit, partial(_evaluate, prepared, unit))
+
+
+def _evaluate(prepared: Prepared, unit: tuple[Request, float]) -> dict[str, Any]:
     request, above = unit
     placed = prepared.scene_at(request.pose, request.grid)
     reachable = placed.reachable_share

@@ -1,0 +1,149 @@
+"""What a computation asked about collisions, and whether another cell answers the same.
+
+A computation that sees its cell through a checker alone ends the same way in another
+cell, to the last bit, if everything it asked has the same answer there. So a result is
+taken over from a cell that differs by bodies which stand still: most questions were
+asked far away from these, and the others are asked again ("verifying traces"; Mokhov,
+Mitchell and Peyton Jones, "Build systems à la carte", 2018).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+
+from reachmap._typing import BoolArray, FloatArray
+
+if TYPE_CHECKING:
+    from reachmap.core.collision.checker import CollisionChecker
+    from reachmap.core.scene import Scene
+
+Box = tuple[FloatArray, FloatArray]
+Asker = Callable[["Scene"], Callable[..., Any]]
+FREE, TOUCHING = -1, -2
+"""What was asked of a configuration; a number from 0 on is a rung of the ladder."""
+# Boxes are kept in single precision: a micrometre covers the rounding.
+ROUNDING_M = 1e-6
+# Configurations at a time, for the sake of memory.
+BLOCK = 4096
+
+
+class Trace:
+    """Questions of a computation with their answers, in their order.
+
+    Parameters
+    ----------
+    checker : CollisionChecker
+        Whom they are put to. Where another one is asked as well, the trace is not whole
+        and says nothing about other cells.
+
+    Attributes
+    ----------
+    is_whole : bool
+    """
+
+    current: ClassVar[Trace | None] = None
+    """Where questions are noted now."""
+
+    def __init__(self, checker: CollisionChecker) -> None:
+        self.is_whole = True
+        self._checker: CollisionChecker | None = checker
+        self._body_pairs = checker.body_pairs
+        self._q: list[bytes] = []
+        self._about: list[int] = []
+        self._answers: list[Any] = []
+        self._others: list[tuple[Asker, tuple[Any, ...], Any]] = []
+        self._Q, self._kind = np.zeros((0, 0)), np.zeros(0, np.int8)
+        self._low = self._high = np.zeros((0, 0, 3), np.float32)
+
+    def __len__(self) -> int:
+        """Questions about configurations."""
+        return len(self._answers)
+
+    @contextmanager
+    def recording(self) -> Iterator[None]:
+        """Context in which questions are noted here; then the trace is closed."""
+        Trace.current = self
+        try:
+            yield
+        finally:
+            Trace.current = None
+            self._close()
+
+    def note(
+        self, checker: CollisionChecker, about: int, q: FloatArray, answer: Any
+    ) -> None:
+        """Note what a checker answered about a configuration (dof,)."""
+        if checker is not self._checker:
+            self.is_whole = False
+        self._q.append(np.asarray(q, float).tobytes())
+        self._about.append(about)
+        self._answers.append(answer)
+
+    def note_other(self, asker: Asker, answer: Any, *args: Any) -> None:
+        """Note the answer to another question, which ``asker(scene)(*args)`` repeats.
+
+        What is asked of the checker to find the answer need not be noted beside it.
+        """
+        self._others.append((asker, args, answer))
+
+    def _close(self) -> None:
+        checker = self._checker
+        assert checker is not None
+        self._checker = None
+        if not self._q:
+            return
+        self._Q = np.frombuffer(b"".join(self._q)).reshape(len(self._q), -1)
+        self._kind = np.array(self._about, np.int8)
+        self._q, self._about = [], []
+        margin_m = checker.widest_margin_m(self._kind)[:, None, None] + ROUNDING_M
+        parts = []
+        for begin in range(0, len(self._Q), BLOCK):
+            block = slice(begin, begin + BLOCK)
+            low, high = checker.bound.boxes(self._Q[block])
+            around = np.stack([low - margin_m[block], high + margin_m[block]])
+            parts.append(around.astype(np.float32))
+        self._low, self._high = np.concatenate(parts, axis=1)
+
+    def repeats_in(self, scene: Scene, changed: Sequence[Box]) -> bool:
+        """Whether another cell gives the same answers, all of them.
+
+        Parameters
+        ----------
+        scene : Scene
+            Of the other cell, with the same moving bodies.
+        changed : sequence of (array, array)
+            Low and high corners (3,) in robot_base of boxes around every body that the
+            cells do not have in common, in the one and in the other.
+        """
+        if scene.checker.body_pairs != self._body_pairs:
+            return False
+        ask = scene.checker.asked
+        for k in np.flatnonzero(self._near(changed)).tolist():
+            if ask(int(self._kind[k]), self._Q[k]) != self._answers[k]:
+                return False
+        askers: dict[Asker, Callable[..., Any]] = {}
+        for asker, args, answer in self._others if changed else ():
+            if asker not in askers:
+                askers[asker] = asker(scene)
+            if askers[asker](*args) != answer:
+                return False
+        return True
+
+    def _near(self, changed: Sequence[Box]) -> BoolArray:
+        """Questions that some of the boxes may matter to, shape (questions,)."""
+        near = np.zeros(len(self._Q), bool)
+        if not len(self._Q):
+            return near
+        all_low, all_high = self._low.min(axis=0), self._high.max(axis=0)
+        for low, high in changed:
+            for joint in np.flatnonzero(
+                ((all_low <= high) & (all_high >= low)).all(axis=1)
+            ):
+                near |= (
+                    (self._low[:, joint] <= high) & (self._high[:, joint] >= low)
+                ).all(axis=1)
+        return near

@@ -1,0 +1,165 @@
+"""Results of computations, for cells in which they would come out the same."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections import OrderedDict
+from collections.abc import Callable, Collection, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
+
+from reachmap.core.collision.bodies import world_placements, world_shapes
+from reachmap.core.collision.static_bodies import box_around
+from reachmap.core.collision.trace import Box, Trace
+
+if TYPE_CHECKING:
+    from reachmap.cell.loading import LoadedCell
+    from reachmap.core.scene import Scene
+
+Result = TypeVar("Result")
+# About 250 bytes a question: what a process keeps stays well below a gigabyte.
+MOST_QUESTIONS = 2_000_000
+# What a cell is called, and how its numbers were written.
+NEVER_READ = ("name", "description", "parameters", "expressions")
+
+
+def fingerprint(
+    loaded: LoadedCell, *, without: Collection[str] = (), surroundings: bool = True
+) -> str:
+    """Equal for cells that are the same to a computation.
+
+    Parameters
+    ----------
+    loaded : LoadedCell
+    without : collection of str
+        Parts of the cell that the computation does not read: ``bin``, ``bin.pose``.
+    surroundings : bool
+        Whether places and sizes of what stands in the world count.
+    """
+    data = json.loads(loaded.resolved_json)
+    for name in (*NEVER_READ, *without):
+        *parents, last = name.split(".")
+        part = data
+        for parent in parents:
+            part = part[parent]
+        part.pop(last, None)
+    if not surroundings:
+        # A camera goes where the body goes that it is mounted on.
+        camera = loaded.cell.camera
+        names = {*world_shapes(loaded)} - {camera.parent if camera else ""}
+        for body in data["bodies"]:
+            if body["name"] in names:
+                body["shape"] = body["pose"] = None
+    files = dict(sorted(loaded.files_sha256.items()))
+    text = json.dumps([data, loaded.urdf, loaded.srdf, files], sort_keys=True)
+    return hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Surroundings:
+    """What :func:`fingerprint` can leave out: text and box of each body, by name."""
+
+    text: dict[str, str]
+    box: dict[str, Box]
+
+    @classmethod
+    def of(cls, scene: Scene) -> _Surroundings:
+        robot, loaded = scene.robot, scene.loaded
+        place = world_placements(robot, loaded)
+        return cls(
+            text={
+                body.name: body.model_dump_json(include={"shape", "pose"})
+                for body in loaded.cell.bodies
+            },
+            box={
+                name: box_around(shape, robot.T_base_root @ place[name])
+                for name, shape in world_shapes(loaded).items()
+            },
+        )
+
+    def changed(self, other: _Surroundings) -> list[Box]:
+        """Boxes around what is not the same in another cell, here and there."""
+        return [
+            box
+            for name in self.box
+            if self.text[name] != other.text[name]
+            for box in (self.box[name], other.box[name])
+        ]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Known:
+    surroundings: _Surroundings
+    trace: Trace
+    result: Any
+
+
+class Memo:
+    """Keeps results with what they rest on; the latest of them, up to a size.
+
+    Attributes
+    ----------
+    found, computed : int
+        Results taken over so far, and those that had to be computed.
+    """
+
+    current: ClassVar[Memo | None] = None
+    """What :func:`remembered` asks; None computes everything."""
+
+    def __init__(self, most_questions: int = MOST_QUESTIONS) -> None:
+        self._most, self._questions = most_questions, 0
+        self._known: OrderedDict[str, list[_Known]] = OrderedDict()
+        self.found = self.computed = 0
+
+    @contextmanager
+    def at_work(self) -> Iterator[None]:
+        """Context in which :func:`remembered` asks this memo."""
+        Memo.current = self
+        try:
+            yield
+        finally:
+            Memo.current = None
+
+    def result(self, key: str, scene: Scene, compute: Callable[[], Result]) -> Result:
+        """See :func:`remembered`."""
+        here = _Surroundings.of(scene)
+        entries = self._known.setdefault(key, [])
+        self._known.move_to_end(key)
+        for known in reversed(entries):
+            if known.trace.repeats_in(scene, known.surroundings.changed(here)):
+                self.found += 1
+                result: Result = known.result
+                return result
+        self.computed += 1
+        trace = Trace(scene.checker)
+        with trace.recording():
+            result = compute()
+        if trace.is_whole:
+            entries.append(_Known(surroundings=here, trace=trace, result=result))
+            self._questions += len(trace)
+            self._forget_oldest()
+        return result
+
+    def _forget_oldest(self) -> None:
+        while self._questions > self._most and self._known:
+            _, entries = self._known.popitem(last=False)
+            self._questions -= sum(len(known.trace) for known in entries)
+
+
+def remembered(key: str, scene: Scene, compute: Callable[[], Result]) -> Result:
+    """Compute a result, or take it over from a cell in which it is the same.
+
+    Parameters
+    ----------
+    key : str
+        Equal where the result depends on nothing but the answers to what is asked of
+        the scene's checker: see :func:`fingerprint`.
+    scene : Scene
+    compute : callable
+        Its result must not be changed afterwards.
+    """
+    if Memo.current is None or Trace.current is not None:
+        return compute()
+    return Memo.current.result(key, scene, compute)

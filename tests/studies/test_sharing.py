@@ -1,0 +1,134 @@
+"""What variants share: a result taken over is that of a run from scratch, or none."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from reachmap.cell.loading import LoadedCell, read_cell
+from reachmap.core.collision.trace import Trace
+from reachmap.core.memo import Memo, fingerprint, remembered
+from reachmap.core.scene import Scene
+from reachmap.tools import variant
+from tests.studies.test_study import HEIGHT, RADIUS, SMALL
+
+PLACED = (*SMALL, "placement.z=[-0.2,-0.2]")
+OBJECTIVES = ("level_average", "bin_reachability", "path_length_rad")
+
+
+def toy(*changes: str) -> LoadedCell:
+    """The planar toy with some changes."""
+    return read_cell("planar-toy", [*PLACED, *changes])
+
+
+def computed(loaded: LoadedCell) -> dict[str, Any]:
+    """One variant with its bin placed: three maps and what they come to."""
+    workspace = variant.map_workspace(None, loaded)
+    context = variant.VariantContext(
+        objectives=OBJECTIVES, places_bin=True, workspaces=[workspace]
+    )
+    unit = variant.VariantUnit(loaded=loaded, workspace=0)
+    return variant.compute_variant(context, unit)
+
+
+@pytest.fixture
+def memo(monkeypatch: pytest.MonkeyPatch) -> Memo:
+    """An empty memo in the place of that of the process."""
+    fresh = Memo()
+    monkeypatch.setattr(variant, "_MEMO", fresh)
+    return fresh
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("change", "is_shared"),
+    [
+        # Above and below the plane of the arm nothing of it is met.
+        (f"{HEIGHT}=0.14", True),
+        # Where it stands matters to link 1, at angles that were asked about.
+        (f"{RADIUS}=0.012", False),
+        ("bodies.post.pose.xyz=[0.055,0.03,0]", False),
+    ],
+)
+def test_maps_with_shared_work_are_those_from_scratch(
+    memo: Memo, monkeypatch: pytest.MonkeyPatch, change: str, is_shared: bool
+) -> None:
+    """Hashes and outcomes are equal, whether all, some or no work is taken over."""
+    computed(toy())
+    before = memo.computed
+    shared = computed(toy(change))
+    assert (memo.found > 0.9 * before) == is_shared
+    monkeypatch.setattr(variant, "_MEMO", Memo())
+    alone = computed(toy(change))
+    assert shared["sha256"] == alone["sha256"]
+    assert set(shared["sha256"]) == {"workspace", "placement", "bin"}
+    for name, outcome in alone["outcomes"].items():
+        for field, value in outcome.items():
+            assert np.array_equal(shared["outcomes"][name][field], value, True)
+
+
+def test_what_differs_otherwise_is_never_shared(memo: Memo) -> None:
+    """Another tool, seed or joint limit is another key."""
+    texts = {
+        fingerprint(toy(change), surroundings=False)
+        for change in (
+            "seed=1",
+            "seed=2",
+            "robot.tcp.xyz.0=0.11",
+            "robot.limits.velocity_rad_s=1",
+            "collision.safety_margin_m=0.001",
+            "bodies.post.touch=[link_1]",
+        )
+    }
+    assert len(texts) == 6
+    assert fingerprint(toy(), surroundings=False) == fingerprint(
+        toy(f"{RADIUS}=0.02", "bodies.post.pose.xyz=[1,1,1]"), surroundings=False
+    )
+    assert fingerprint(toy()) != fingerprint(toy(f"{RADIUS}=0.02"))
+
+
+def asked(scene: Scene, Q: np.ndarray) -> list[bool]:
+    """Some computation: what it returns depends on nothing but the answers."""
+    return [scene.checker.is_free(q) for q in Q]
+
+
+def test_answers_are_asked_again_near_what_changed() -> None:
+    """Random bodies beside the arm: taken over exactly where all answers agree."""
+    rng = np.random.default_rng(0)
+    Q = rng.uniform(-3.0, 3.0, (40, 3))
+    memo = Memo()
+    truth: set[tuple[bool, ...]] = set()
+    with memo.at_work():
+        for k in range(12):
+            x, y = rng.uniform(-0.5, 0.5, 2).round(3) if k else (0.06, 0.0)
+            loaded = toy(f"bodies.post.pose.xyz=[{x},{y},0]")
+            scene = Scene.build(loaded, with_bin=False)
+            with_memo = remembered("k", scene, lambda s=scene: asked(s, Q))
+            assert with_memo == asked(scene, Q)
+            truth.add(tuple(with_memo))
+    # A body that is in the way nowhere gives what another one like it has given.
+    assert memo.computed >= len(truth) > 1
+    assert memo.found + memo.computed == 12
+
+
+def test_questions_to_another_checker_are_not_taken_over() -> None:
+    """A trace that is not whole says nothing; the result is computed each time."""
+    scene, other = (Scene.build(toy(), with_bin=b) for b in (False, True))
+    memo, q = Memo(), np.zeros(3)
+    with memo.at_work():
+        for _ in range(2):
+            remembered("k", scene, lambda: other.checker.is_free(q))
+    assert (memo.found, memo.computed) == (0, 2)
+    assert Trace.current is None
+
+
+def test_the_oldest_results_are_forgotten() -> None:
+    """What a process keeps has a bound in questions."""
+    scene, q = Scene.build(toy(), with_bin=False), np.zeros(3)
+    memo = Memo(most_questions=3)
+    with memo.at_work():
+        for key in ("a", "b", "c", "d", "a", "d"):
+            remembered(key, scene, lambda: scene.checker.is_free(q))
+    assert (memo.found, memo.computed) == (1, 5)
