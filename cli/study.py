@@ -63,6 +63,12 @@ OBJECTIVES = (
     "NAME=LOW:HIGH, each from what those before were worth.",
 )
 @click.option(
+    "--halving",
+    is_flag=True,
+    help="Map all variants on coarse grids first, and leave out, of the worse half, "
+    "what is surely below the best; rows say so.",
+)
+@click.option(
     "--place/--keep-bin",
     default=False,
     show_default=True,

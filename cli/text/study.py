@@ -24,7 +24,9 @@ LINE = 88
 def study_lines(summary: StudySummary) -> list[str]:
     """Best variant, sentences, main effects, and the table of all variants."""
     failed = f", {summary.failed} failed" if summary.failed else ""
-    count = f"{plural(len(summary.variants), 'variant')} ({summary.done} done{failed})"
+    left = f", {summary.left_out} left out" if summary.left_out else ""
+    done = f"{summary.done} done{failed}{left}"
+    count = f"{plural(len(summary.variants), 'variant')} ({done})"
     head = f"{count}, {summary.design.replace('_', ' ')}, bin {summary.bin_mode}"
     return [
         head,
@@ -148,12 +150,22 @@ def _role(summary: StudySummary, variant: VariantSummary) -> str:
 
 
 def _cause_lines(summary: StudySummary) -> list[str]:
-    failed = [variant for variant in summary.variants if variant.cause]
-    if not failed:
+    found = []
+    for state, title in (
+        ("failed", "Variants that failed"),
+        ("left_out", "Variants that were left out"),
+    ):
+        rows = [variant for variant in summary.variants if variant.status == state]
+        found += _causes_of(title, rows)
+    return found
+
+
+def _causes_of(title: str, rows: list[VariantSummary]) -> list[str]:
+    if not rows:
         return []
     lines = [
         line
-        for variant in failed[:SENTENCES_SHOWN]
+        for variant in rows[:SENTENCES_SHOWN]
         for line in textwrap.wrap(
             f"{variant.assignment}: {variant.cause}",
             LINE,
@@ -161,4 +173,6 @@ def _cause_lines(summary: StudySummary) -> list[str]:
             subsequent_indent="    ",
         )
     ]
-    return ["", "Variants that failed", *lines]
+    rest = len(rows) - SENTENCES_SHOWN
+    more = [f"  and {rest} more (--json has all)"] if rest > 0 else []
+    return ["", title, *lines, *more]

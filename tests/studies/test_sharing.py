@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -105,7 +106,7 @@ def test_answers_are_asked_again_near_what_changed() -> None:
             x, y = rng.uniform(-0.5, 0.5, 2).round(3) if k else (0.06, 0.0)
             loaded = toy(f"bodies.post.pose.xyz=[{x},{y},0]")
             scene = Scene.build(loaded, with_bin=False)
-            with_memo = remembered("k", scene, lambda s=scene: asked(s, Q))
+            with_memo = remembered("k", scene, partial(asked, scene, Q))
             assert with_memo == asked(scene, Q)
             truth.add(tuple(with_memo))
     # A body that is in the way nowhere gives what another one like it has given.

@@ -31,6 +31,11 @@ def failure(cause: str) -> dict[str, Any]:
     return {"cause": cause, "sha256": {}, "outcomes": {}}
 
 
+def left_out(cause: str) -> dict[str, Any]:
+    """Payload of a variant that coarse maps have ruled out."""
+    return failure(cause) | {"left_out": True}
+
+
 def blank(document: Mapping[str, Any], unit: int, status: Status) -> dict[str, Any]:
     """Payload of a variant that was not computed, or broke."""
     return failure("it broke" if status == Status.ERROR else "")
@@ -119,6 +124,8 @@ def _hashes(found: Sequence[Mapping[str, Any]], name: str) -> tuple[str, ...]:
 def _status(found: Sequence[Mapping[str, Any]], done: BoolArray) -> Any:
     failed = np.array([bool(payload["cause"]) for payload in found])
     status = np.where(failed, VariantStatus.FAILED, VariantStatus.NOT_ATTEMPTED)
+    left = np.array([payload.get("left_out", False) for payload in found])
+    status = np.where(left, VariantStatus.LEFT_OUT, status)
     return np.where(done & ~failed, VariantStatus.DONE, status).astype(np.uint8)
 
 

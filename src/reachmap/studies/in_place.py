@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 from reachmap.core.memo import fingerprint, remembered
@@ -37,7 +38,7 @@ class _InPlace:
         state = job.prepare(job.context)
         # As they would come from a store, bit for bit.
         texts = [
-            self._text(f"{phase} {k}", lambda unit=unit: job.function(state, unit))
+            self._text(f"{phase} {k}", partial(job.function, state, unit))
             for k, unit in enumerate(units)
         ]
         return [decode(text) for text in texts]

@@ -23,7 +23,7 @@ from reachmap.maps.comparison.significance import (
     paired_means,
 )
 from reachmap.maps.records import BinMap, Status, WorkspaceMap
-from reachmap.maps.study.record import MEANS, PATH_LENGTH
+from reachmap.maps.study.record import LOWER_IS_BETTER, MEANS, PATH_LENGTH
 from reachmap.maps.summary.directions import (
     approach_direction,
     reachability_of_directions,
@@ -269,3 +269,28 @@ class Requirement:
 def is_met(requirements: Sequence[Requirement], values: Mapping[str, float]) -> bool:
     """Whether all requirements are met."""
     return all(requirement.holds(values) for requirement in requirements)
+
+
+# What failed is worth less than anything, and what breaks a requirement less than
+# anything that meets them all, the more the further off it is.
+FAILED, UNMET = -1e9, -1e6
+
+
+def worth(
+    payload: Mapping[str, Any], objective: str, requirements: Sequence[Requirement]
+) -> float:
+    """What a variant is worth; more is better."""
+    values = {
+        name: float(found["value"]) for name, found in payload["outcomes"].items()
+    }
+    value = values.get(objective, np.nan)
+    if np.isnan(value):
+        return FAILED
+    short = sum(
+        abs(values[item.objective] - item.bound)
+        for item in requirements
+        if not item.holds(values)
+    )
+    if short > 0.0:
+        return UNMET - short
+    return -value if objective in LOWER_IS_BETTER else value

@@ -2,27 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-import numpy as np
-
 from reachmap.cell.loading import read_cell
 from reachmap.errors import CellError
-from reachmap.maps.study.record import LOWER_IS_BETTER
 from reachmap.runtime.job import Job, Stages, Work
 from reachmap.scans.document import journal_settings
 from reachmap.studies.assembly import KIND, tally
 from reachmap.studies.design import Factor, Variant
 from reachmap.studies.optimiser import Optimiser
-from reachmap.studies.outcomes import Requirement
+from reachmap.studies.outcomes import Requirement, worth
 from reachmap.tools.variant import Proposal, VariantContext, compute_proposal
-
-# What failed is worth less than anything, and what breaks a requirement less than
-# anything that meets them all, the more the further off it is.
-FAILED, UNMET = -1e9, -1e6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -52,23 +45,6 @@ class Search:
         except CellError as error:
             return Proposal(row=row | {"cause": "; ".join(error.lines)}, loaded=None)
         return Proposal(row=row | {"cell_sha256": loaded.sha256}, loaded=loaded)
-
-    def worth(self, payload: Mapping[str, Any], objective: str) -> float:
-        """What a variant is worth; more is better."""
-        values = {
-            name: float(found["value"]) for name, found in payload["outcomes"].items()
-        }
-        value = values.get(objective, np.nan)
-        if np.isnan(value):
-            return FAILED
-        short = sum(
-            abs(values[item.objective] - item.bound)
-            for item in self.requirements
-            if not item.holds(values)
-        )
-        if short > 0.0:
-            return UNMET - short
-        return -value if objective in LOWER_IS_BETTER else value
 
 
 def search_work(
@@ -102,7 +78,7 @@ def _job(
         proposals = [search.proposal(variant) for variant in variants]
         payloads = stages.run(f"round_{k}", job, proposals)
         search.optimiser.tell(
-            [search.worth(payload, objectives[0]) for payload in payloads]
+            [worth(item, objectives[0], search.requirements) for item in payloads]
         )
         found += payloads
     return Job(function=_pick, context=found, tally=tally)

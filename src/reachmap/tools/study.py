@@ -32,6 +32,7 @@ from reachmap.studies.design import (
 )
 from reachmap.studies.optimiser import Optimiser
 from reachmap.studies.outcomes import OPERATORS, Requirement
+from reachmap.tools.halved_study import halved_work
 from reachmap.tools.optimised_study import Search, search_work
 from reachmap.tools.options import with_seed
 from reachmap.tools.prologue import (
@@ -60,6 +61,7 @@ def study(
     vary: Sequence[str],
     samples: int | None = None,
     optimise: int | None = None,
+    halving: bool = False,
     place: bool = False,
     objectives: Sequence[str] = (),
     require: Sequence[str] = (),
@@ -82,6 +84,8 @@ def study(
         Variants of a Latin hypercube instead of every combination.
     optimise : int, optional
         Variants that an optimiser proposes, each from what those before were worth.
+    halving : bool
+        Leave out variants that coarse maps show to be poor.
     place : bool
         Place the bin again in each variant.
     objectives : sequence of str
@@ -115,6 +119,8 @@ def study(
     _check_objectives(names, base)
     if samples is not None and optimise is not None:
         raise SettingsError("give --optimise or --latin-hypercube, not both")
+    if halving and optimise is not None:
+        raise SettingsError("--halving: --optimise leaves out what is poor by itself")
     factors = factors_of(
         vary, base, sampled=samples is not None, optimised=optimise is not None
     )
@@ -127,6 +133,7 @@ def study(
         "vary": list(vary),
         "samples": samples,
         **({} if optimise is None else {"optimise": optimise}),
+        **({"halving": True} if halving else {}),
         "bin": "placed" if place else "kept",
         "objectives": list(names),
         "require": [str(item) for item in requirements],
@@ -140,7 +147,7 @@ def study(
     }
     design = _Design(cell, tuple(overrides), factors, base, requirements, names, place)
     work = (
-        design.work(document, samples)
+        design.work(document, samples, halving=halving)
         if optimise is None
         else design.search(document, optimise)
     )
@@ -161,7 +168,9 @@ class _Design:
     objectives: tuple[str, ...]
     places_bin: bool
 
-    def work(self, document: dict[str, Any], samples: int | None) -> Work:
+    def work(
+        self, document: dict[str, Any], samples: int | None, *, halving: bool
+    ) -> Work:
         """Work of variants that are known beforehand."""
         variants = (
             grid(self.factors)
@@ -174,7 +183,20 @@ class _Design:
             "base": base_of(self.factors, variants, self.base),
             "rows": rows,
         }
-        return study_work(cells, document, self.objectives, places_bin=self.places_bin)
+        if not halving:
+            return study_work(
+                cells, document, self.objectives, places_bin=self.places_bin
+            )
+        unit = rows[document["base"]]["unit"]
+        return halved_work(
+            cells,
+            document,
+            VariantContext(
+                objectives=self.objectives, places_bin=self.places_bin, workspaces=()
+            ),
+            base=-1 if unit is None else unit,
+            requirements=self.requirements,
+        )
 
     def search(self, document: dict[str, Any], count: int) -> Work:
         """Work of variants that an optimiser proposes, the cell as it is first."""

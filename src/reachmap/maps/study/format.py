@@ -17,7 +17,7 @@ from reachmap.maps.study.record import MEANS, STATES, Study, VariantStatus
 
 TEXTS: Final = {
     "assignment": "What the variant sets.",
-    "cause": "Why the variant failed; empty if it did not.",
+    "cause": "Why the variant failed, or was left out; empty: neither.",
     "cell_sha256": "Hash of the variant's cell; empty where it is none.",
     "workspace_sha256": "content_sha256 of its workspace map; empty: none.",
     "placement_sha256": "content_sha256 of its placement; empty: none.",

@@ -44,6 +44,7 @@ class VariantStatus(IntEnum):
     NOT_ATTEMPTED = 0
     DONE = 1
     FAILED = 2
+    LEFT_OUT = 3
 
 
 STATES = tuple(state.name.lower() for state in VariantStatus)
@@ -75,7 +76,7 @@ class Study:
     status : uint8 array, shape (nv,)
         :class:`VariantStatus` codes.
     cause : tuple of str
-        Why a variant failed, "" if it did not.
+        Why a variant failed or was left out, "" if it was not.
     feasible : uint8 array, shape (nv,)
         1 where all requirements are met.
     cell_sha256, workspace_sha256, placement_sha256, bin_sha256 : tuple of str

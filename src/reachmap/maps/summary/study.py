@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from reachmap._typing import FloatArray
-from reachmap.maps.study.record import OBJECTIVES, STATES, Study
+from reachmap.maps.study.record import OBJECTIVES, STATES, Study, VariantStatus
 
 UNIT_WORDS = {"percent": "%", "rad": "rad", "s": "s"}
 CHANGE_WORDS = {"percent": "points", "rad": "rad", "s": "s"}
@@ -80,6 +80,7 @@ class StudySummary:
     bin_mode: str
     done: int
     failed: int
+    left_out: int
     base: int
     best: int
     runner_up: int
@@ -94,7 +95,8 @@ def summarise_study(study: Study) -> StudySummary:
         design=study.design,
         bin_mode=study.bin_mode,
         done=int(study.done.sum()),
-        failed=sum(bool(cause) for cause in study.cause),
+        failed=int((study.status == VariantStatus.FAILED).sum()),
+        left_out=int((study.status == VariantStatus.LEFT_OUT).sum()),
         base=study.base,
         best=study.best,
         runner_up=study.runner_up,
