@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from reachmap.cell.loading import LoadedCell, read_cell
-from reachmap.core.collision.trace import Trace
+from reachmap.core.trace import Trace
 from reachmap.core.memo import Memo, fingerprint, remembered
 from reachmap.core.scene import Scene
 from reachmap.tools import variant

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 from reachmap.core.collision.bodies import world_placements, world_shapes
 from reachmap.core.collision.static_bodies import box_around
-from reachmap.core.collision.trace import Box, Trace
+from reachmap.core.trace import Box, Trace
 
 if TYPE_CHECKING:
     from reachmap.cell.loading import LoadedCell
@@ -79,10 +79,10 @@ class _Surroundings:
             },
         )
 
-    def changed(self, other: _Surroundings) -> list[Box]:
-        """Boxes around what is not the same in another cell, here and there."""
+    def changed(self, other: _Surroundings) -> list[tuple[str, Box]]:
+        """What is not the same in another cell, with the boxes here and there."""
         return [
-            box
+            (name, box)
             for name in self.box
             if self.text[name] != other.text[name]
             for box in (self.box[name], other.box[name])

@@ -18,7 +18,7 @@ from reachmap.core.collision.static_bodies import (
     PlacedBody,
     bodies_at,
 )
-from reachmap.core.collision.trace import Trace
+from reachmap.core.trace import Trace
 from reachmap.geometry import inverse_transform, transform_from_parts
 
 if TYPE_CHECKING:

@@ -24,8 +24,8 @@ from reachmap.core.collision.bodies import BodyGeometry
 from reachmap.core.collision.displacement import MotionBound
 from reachmap.core.collision.never_meet import PairMotion, pairs_that_never_meet
 from reachmap.core.collision.shapes import convex_hull
-from reachmap.core.collision.trace import FREE, TOUCHING, Trace
 from reachmap.core.robot.chain import SerialChain
+from reachmap.core.trace import FREE, TOUCHING, Trace
 
 if TYPE_CHECKING:
     from reachmap.core.robot.model import RobotModel
@@ -211,12 +211,41 @@ class CollisionChecker:
             return self.touching_pairs(q)
         return self.is_free(q) if about == FREE else self._is_clear_at(about, q)
 
-    def widest_margin_m(self, about: IntArray) -> FloatArray:
-        """How near two bodies have to be to matter to what was asked, shape (n,)."""
+    def margins_m(self, about: IntArray) -> FloatArray:
+        """How near a body has to be to one that stands still to matter.
+
+        Parameters
+        ----------
+        about : int array, shape (n,)
+            What was asked.
+
+        Returns
+        -------
+        array, shape (n, bodies)
+            For the bodies that the chain moves [m].
+        """
+        share = np.zeros(len(self.bodies.geometryObjects))
+        for pair, value in zip(self.bodies.collisionPairs, self._shares, strict=True):
+            for body in (pair.first, pair.second):
+                share[body] = max(share[body], value)
         steps = np.array([*LADDER_M, 0.0])[np.maximum(about, FREE)]
-        return np.asarray(
-            self.safety_margin_m + steps * self._shares.max(initial=1.0), float
-        )
+        moving = share[self.bound.on_chain]
+        return np.asarray(self.safety_margin_m + steps[:, None] * moving)
+
+    def bodies_against(self, name: str) -> tuple[int, ...] | None:
+        """Which bodies are checked against one that stands still.
+
+        Counted among those that the chain moves; None where there are others.
+        """
+        number = {int(body): k for k, body in enumerate(self.bound.on_chain)}
+        found = {
+            number.get(pair.first, number.get(pair.second, -1))
+            for pair, names in zip(
+                self.bodies.collisionPairs, self._pair_names, strict=True
+            )
+            if name in names.split(" | ")
+        }
+        return None if -1 in found else tuple(sorted(found))
 
     def free_mask(self, Q: FloatArray) -> BoolArray:
         """:meth:`is_free` of many configurations, shape (n, dof) to (n,)."""

@@ -10,7 +10,7 @@ import pinocchio as pin
 
 from reachmap._typing import BoolArray, FloatArray, IntArray
 from reachmap.core.collision.checker import CollisionChecker, guess_nothing
-from reachmap.core.collision.trace import Trace
+from reachmap.core.trace import Trace
 from reachmap.geometry import pieces
 
 if TYPE_CHECKING:

@@ -15,6 +15,7 @@ import numpy as np
 
 from reachmap._typing import FloatArray
 from reachmap.cell.model.shapes import box_corners, corner_points
+from reachmap.core.collision.extents import Extents
 
 if TYPE_CHECKING:
     from reachmap.core.collision.bodies import BodyGeometry
@@ -69,6 +70,8 @@ class MotionBound:
         self._chain = chain
         self._bounds, self._reach_m = bounds, reach_m
         self._corners = _corners_by_joint(chain, robot.model, bodies)
+        self._extents = Extents.of(chain, robot.model, bodies)
+        self.on_chain = self._extents.body
         parents = [g.parentJoint for g in bodies.geometry.geometryObjects]
         self._joint = np.array(parents, np.int64) - 1
         # Of bodies beside the chain nothing better is known than R.
@@ -110,9 +113,7 @@ class MotionBound:
         return np.asarray(np.where(self._beside, reach, moved))
 
     def boxes(self, Q: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Boxes around the bodies of each joint, in robot_base.
-
-        Without bounds where bodies move beside the chain.
+        """Boxes around the bodies that the chain moves, in robot_base.
 
         Parameters
         ----------
@@ -120,17 +121,10 @@ class MotionBound:
 
         Returns
         -------
-        low, high : array, shape (n, dof, 3)
+        low, high : array, shape (n, bodies, 3)
+            For each geometry object of :attr:`on_chain`.
         """
-        frames = self._chain.joint_frames_many(Q)
-        R, origin = frames[..., :3, :3], frames[..., :3, 3]
-        centre = self._corners.mean(axis=2)
-        half = self._corners.max(axis=2) - centre
-        middle = (R @ centre[..., None])[..., 0] + origin
-        room = (np.abs(R) @ half[..., None])[..., 0]
-        if self._beside.any():
-            room = np.full_like(room, np.inf)
-        return middle - room, middle + room
+        return self._extents.boxes(self._chain.joint_frames_many(Q))
 
     def _speed_m(self, Q: FloatArray, half_change: FloatArray) -> FloatArray:
         """Fastest point on each joint at the middles of motions, shape (n, dof)."""

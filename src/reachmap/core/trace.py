@@ -99,7 +99,7 @@ class Trace:
         self._Q = np.frombuffer(b"".join(self._q)).reshape(len(self._q), -1)
         self._kind = np.array(self._about, np.int8)
         self._q, self._about = [], []
-        margin_m = checker.widest_margin_m(self._kind)[:, None, None] + ROUNDING_M
+        margin_m = checker.margins_m(self._kind)[..., None] + ROUNDING_M
         parts = []
         for begin in range(0, len(self._Q), BLOCK):
             block = slice(begin, begin + BLOCK)
@@ -108,21 +108,27 @@ class Trace:
             parts.append(around.astype(np.float32))
         self._low, self._high = np.concatenate(parts, axis=1)
 
-    def repeats_in(self, scene: Scene, changed: Sequence[Box]) -> bool:
+    def repeats_in(self, scene: Scene, changed: Sequence[tuple[str, Box]]) -> bool:
         """Whether another cell gives the same answers, all of them.
 
         Parameters
         ----------
         scene : Scene
             Of the other cell, with the same moving bodies.
-        changed : sequence of (array, array)
-            Low and high corners (3,) in robot_base of boxes around every body that the
-            cells do not have in common, in the one and in the other.
+        changed : sequence of (str, (array, array))
+            Every body that the cells do not have in common, by name, with the low and
+            high corners (3,) of a box around it in robot_base: in the one cell, and in
+            the other.
         """
-        if scene.checker.body_pairs != self._body_pairs:
+        checker = scene.checker
+        if checker.body_pairs != self._body_pairs:
             return False
-        ask = scene.checker.asked
-        for k in np.flatnonzero(self._near(changed)).tolist():
+        near = np.zeros(len(self._Q), bool)
+        if len(near):
+            for name, box in changed:
+                near |= self._near(box, checker.bodies_against(name))
+        ask = checker.asked
+        for k in np.flatnonzero(near).tolist():
             if ask(int(self._kind[k]), self._Q[k]) != self._answers[k]:
                 return False
         askers: dict[Asker, Callable[..., Any]] = {}
@@ -133,17 +139,14 @@ class Trace:
                 return False
         return True
 
-    def _near(self, changed: Sequence[Box]) -> BoolArray:
-        """Questions that some of the boxes may matter to, shape (questions,)."""
+    def _near(self, box: Box, bodies: Sequence[int] | None) -> BoolArray:
+        """Questions that a box may matter to, shape (questions,)."""
+        if bodies is None:
+            return np.ones(len(self._Q), bool)
         near = np.zeros(len(self._Q), bool)
-        if not len(self._Q):
-            return near
-        all_low, all_high = self._low.min(axis=0), self._high.max(axis=0)
-        for low, high in changed:
-            for joint in np.flatnonzero(
-                ((all_low <= high) & (all_high >= low)).all(axis=1)
-            ):
-                near |= (
-                    (self._low[:, joint] <= high) & (self._high[:, joint] >= low)
-                ).all(axis=1)
+        low, high = box
+        for body in bodies:
+            below, above = self._low[:, body], self._high[:, body]
+            if (below.min(axis=0) <= high).all() and (above.max(axis=0) >= low).all():
+                near |= ((below <= high) & (above >= low)).all(axis=1)
         return near
