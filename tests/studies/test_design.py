@@ -71,6 +71,8 @@ def test_a_latin_hypercube_takes_each_part_of_each_range_once(toy: LoadedCell) -
         (["bin.wall=1,,2"], "an empty or repeated value"),
         (["bin.wall=1,1"], "an empty or repeated value"),
         (["bin.wall=1,2", "bin.wall=3,4"], "given more than once"),
+        (["tubelength=1,2"], "neither a parameter of the cell .* nor one of its keys"),
+        (["colision.safety_margin_m=1,2"], "did you mean 'collision'?"),
     ],
 )
 def test_what_is_no_design_is_refused(

@@ -14,6 +14,7 @@ from scipy.stats import qmc
 
 from reachmap._typing import FloatArray
 from reachmap.cell.loaded import LoadedCell
+from reachmap.cell.text.messages import did_you_mean
 from reachmap.cell.text.yaml_reader import parse_yaml
 from reachmap.errors import SettingsError
 
@@ -125,6 +126,7 @@ def _factor(text: str, base: LoadedCell, sampled: bool) -> Factor:
             f"--vary {text!r:.120}: expected NAME=LOW:HIGH:N or NAME=a,b,c"
         )
     known = base.cell.parameters.get(name)
+    _require_known(name, base)
     key = name if known is None else f"parameters.{name}"
     unit = "" if known is None else known.unit
     colons = [part.strip() for part in values.split(":")]
@@ -146,6 +148,18 @@ def _factor(text: str, base: LoadedCell, sampled: bool) -> Factor:
         )
     numbers = tuple(value for value in parsed if value is not None)
     return Factor(name=name, key=key, unit=unit, texts=items, numbers=numbers)
+
+
+def _require_known(name: str, base: LoadedCell) -> None:
+    """Refuse what is neither a parameter of the cell nor begins one of its keys."""
+    parameters, keys = base.cell.parameters, json.loads(base.resolved_json)
+    if name in parameters or name.partition(".")[0] in keys:
+        return
+    known = ", ".join(parameters) or "it has none"
+    raise SettingsError(
+        f"--vary {name:.60}: neither a parameter of the cell ({known}) nor one of its "
+        f"keys; {did_you_mean(name, [*parameters, *keys])}"
+    )
 
 
 def _range(text: str, parts: Sequence[str], sampled: bool) -> tuple[float, ...]:

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from reachmap.cell.loading import LoadedCell, read_cell
+from reachmap.core.memo import fingerprint
 from reachmap.errors import CellError, GateFailedError, SettingsError
 from reachmap.maps import Stamp, collect_provenance, config_sha256
 from reachmap.maps.study.record import ALWAYS, OBJECTIVES, Study
@@ -41,6 +42,7 @@ from reachmap.tools.prologue import (
     refuse_cell_files,
 )
 from reachmap.tools.variant import (
+    NOT_OF_WORKSPACE,
     VariantContext,
     VariantUnit,
     compute_variant,
@@ -277,7 +279,25 @@ def _rows(
         rows.append(row)
     if error is not None and not cells:
         raise error
-    return rows, [*cells.values()]
+    return rows, _grouped(rows, [*cells.values()])
+
+
+def _grouped(
+    rows: Sequence[dict[str, Any]], cells: list[LoadedCell]
+) -> list[LoadedCell]:
+    """Cells in an order in which those with the same arm and tool are neighbours.
+
+    A process takes over what it has found for such a cell, and keeps little of it.
+    """
+    arms = [
+        fingerprint(loaded, without=NOT_OF_WORKSPACE, surroundings=False)
+        for loaded in cells
+    ]
+    order = sorted(range(len(cells)), key=lambda k: arms.index(arms[k]))
+    for row in rows:
+        if row["unit"] is not None:
+            row["unit"] = order.index(row["unit"])
+    return [cells[k] for k in order]
 
 
 def _document(base: LoadedCell, settings: dict[str, Any]) -> dict[str, Any]:
