@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from reachmap.cell.loading import LoadedCell, read_cell
-from reachmap.core.trace import Trace
 from reachmap.core.memo import Memo, fingerprint, remembered
 from reachmap.core.scene import Scene
+from reachmap.core.trace import Trace
 from reachmap.tools import variant
 from tests.studies.test_study import HEIGHT, RADIUS, SMALL
 

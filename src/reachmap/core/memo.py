@@ -10,6 +10,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
+import numpy as np
+
 from reachmap.core.collision.bodies import world_placements, world_shapes
 from reachmap.core.collision.static_bodies import box_around
 from reachmap.core.trace import Box, Trace
@@ -94,6 +96,16 @@ class _Known:
     surroundings: _Surroundings
     trace: Trace
     result: Any
+    checks: int
+
+
+@dataclass(frozen=True, slots=True)
+class _Within:
+    """The result that is being computed."""
+
+    key: str
+    scene: Scene
+    surroundings: _Surroundings
 
 
 class Memo:
@@ -111,6 +123,7 @@ class Memo:
     def __init__(self, most_questions: int = MOST_QUESTIONS) -> None:
         self._most, self._questions = most_questions, 0
         self._known: OrderedDict[str, list[_Known]] = OrderedDict()
+        self._within: _Within | None = None
         self.found = self.computed = 0
 
     @contextmanager
@@ -124,20 +137,52 @@ class Memo:
 
     def result(self, key: str, scene: Scene, compute: Callable[[], Result]) -> Result:
         """See :func:`remembered`."""
-        here = _Surroundings.of(scene)
+        within = _Within(key, scene, _Surroundings.of(scene))
+        outer, self._within = self._within, within
+        try:
+            return self._result(key, within, compute)
+        finally:
+            self._within = outer
+
+    def part(self, key: str, compute: Callable[[], Result]) -> Result:
+        """See :func:`remembered_part`."""
+        if self._within is None:
+            return compute()
+        return self._result(f"{self._within.key} {key}", self._within, compute)
+
+    def _result(
+        self, key: str, within: _Within, compute: Callable[[], Result]
+    ) -> Result:
+        scene, outer = within.scene, Trace.current
+        checker, before = scene.checker, scene.checker.checks
         entries = self._known.setdefault(key, [])
         self._known.move_to_end(key)
         for known in reversed(entries):
-            if known.trace.repeats_in(scene, known.surroundings.changed(here)):
+            changed = known.surroundings.changed(within.surroundings)
+            repeats = known.trace.repeats_in(scene, changed)
+            # Budgets count what a computation checks, whoever has done it.
+            checker.checks = before + (known.checks if repeats else 0)
+            if repeats:
                 self.found += 1
+                if outer is not None:
+                    outer.include(known.trace)
                 result: Result = known.result
                 return result
         self.computed += 1
-        trace = Trace(scene.checker)
+        trace = Trace(checker)
         with trace.recording():
             result = compute()
+        if outer is not None:
+            outer.include(trace)
         if trace.is_whole:
-            entries.append(_Known(surroundings=here, trace=trace, result=result))
+            entries.append(
+                _Known(
+                    surroundings=within.surroundings,
+                    trace=trace,
+                    result=result,
+                    checks=checker.checks - before,
+                )
+            )
             self._questions += len(trace)
             self._forget_oldest()
         return result
@@ -163,3 +208,30 @@ def remembered(key: str, scene: Scene, compute: Callable[[], Result]) -> Result:
     if Memo.current is None or Trace.current is not None:
         return compute()
     return Memo.current.result(key, scene, compute)
+
+
+def remembered_part(name: str, compute: Callable[[], Result], *args: Any) -> Result:
+    """Compute a part of such a result, or take it over where all of it cannot be.
+
+    Parameters
+    ----------
+    name : str
+        Of the computation.
+    compute : callable
+        Its result must not be changed afterwards.
+    *args : array, number or text, or sequence of these
+        All that it depends on besides the cell.
+    """
+    if Memo.current is None:
+        return compute()
+    text = hashlib.sha256(repr(_plain(args)).encode()).hexdigest()
+    return Memo.current.part(f"{name} {text}", compute)
+
+
+def _plain(value: Any) -> Any:
+    """Arrays as their bytes, in lists as deep as they were."""
+    if isinstance(value, np.ndarray):
+        return value.shape, value.tobytes()
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    return value

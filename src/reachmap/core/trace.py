@@ -11,14 +11,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from reachmap._typing import BoolArray, FloatArray
+from reachmap._typing import BoolArray, FloatArray, IntArray
 
 if TYPE_CHECKING:
     from reachmap.core.collision.checker import CollisionChecker
+    from reachmap.core.collision.displacement import MotionBound
     from reachmap.core.scene import Scene
 
 Box = tuple[FloatArray, FloatArray]
@@ -56,22 +58,30 @@ class Trace:
         self._about: list[int] = []
         self._answers: list[Any] = []
         self._others: list[tuple[Asker, tuple[Any, ...], Any]] = []
+        self._parts: list[Trace] = []
         self._Q, self._kind = np.zeros((0, 0)), np.zeros(0, np.int8)
         self._low = self._high = np.zeros((0, 0, 3), np.float32)
+        self._margin_m, self._is_tight = np.zeros((0, 0)), np.zeros((0, 0), bool)
+        self._bound: MotionBound | None = None
 
     def __len__(self) -> int:
-        """Questions about configurations."""
+        """Questions about configurations, without those of parts."""
         return len(self._answers)
 
     @contextmanager
     def recording(self) -> Iterator[None]:
         """Context in which questions are noted here; then the trace is closed."""
-        Trace.current = self
+        outer, Trace.current = Trace.current, self
         try:
             yield
         finally:
-            Trace.current = None
+            Trace.current = outer
             self._close()
+
+    def include(self, part: Trace) -> None:
+        """Take in all that a part of the computation has asked."""
+        self._parts.append(part)
+        self.is_whole &= part.is_whole
 
     def note(
         self, checker: CollisionChecker, about: int, q: FloatArray, answer: Any
@@ -99,14 +109,36 @@ class Trace:
         self._Q = np.frombuffer(b"".join(self._q)).reshape(len(self._q), -1)
         self._kind = np.array(self._about, np.int8)
         self._q, self._about = [], []
-        margin_m = checker.margins_m(self._kind)[..., None] + ROUNDING_M
+        bound = self._bound = checker.bound
+        self._is_tight = np.zeros((len(self._Q), len(checker.bound.on_chain)), bool)
+        self._margin_m = checker.margins_m(self._kind) + ROUNDING_M
+        self._low, self._high = self._in_blocks(
+            bound.boxes, np.arange(len(self._Q)), self._margin_m[..., None]
+        )
+
+    def _in_blocks(
+        self, boxes: Callable[[FloatArray], Box], rows: IntArray, margin_m: FloatArray
+    ) -> Any:
+        """Low and high corners, at some questions, with a margin around them."""
         parts = []
-        for begin in range(0, len(self._Q), BLOCK):
-            block = slice(begin, begin + BLOCK)
-            low, high = checker.bound.boxes(self._Q[block])
+        for begin in range(0, len(rows), BLOCK):
+            block = rows[begin : begin + BLOCK]
+            low, high = boxes(self._Q[block])
             around = np.stack([low - margin_m[block], high + margin_m[block]])
             parts.append(around.astype(np.float32))
-        self._low, self._high = np.concatenate(parts, axis=1)
+        return np.concatenate(parts, axis=1)
+
+    def _tighten(self, rows: IntArray, body: int) -> None:
+        """Find smaller boxes around a body at some questions, once."""
+        assert self._bound is not None
+        rows = rows[~self._is_tight[rows, body]]
+        if len(rows):
+            self._is_tight[rows, body] = True
+            self._low[rows, body], self._high[rows, body] = self._in_blocks(
+                partial(self._bound.tight_boxes, body=body),
+                rows,
+                self._margin_m[:, body, None],
+            )
 
     def repeats_in(self, scene: Scene, changed: Sequence[tuple[str, Box]]) -> bool:
         """Whether another cell gives the same answers, all of them.
@@ -137,7 +169,7 @@ class Trace:
                 askers[asker] = asker(scene)
             if askers[asker](*args) != answer:
                 return False
-        return True
+        return all(part.repeats_in(scene, changed) for part in self._parts)
 
     def _near(self, box: Box, bodies: Sequence[int] | None) -> BoolArray:
         """Questions that a box may matter to, shape (questions,)."""
@@ -147,6 +179,10 @@ class Trace:
         low, high = box
         for body in bodies:
             below, above = self._low[:, body], self._high[:, body]
-            if (below.min(axis=0) <= high).all() and (above.max(axis=0) >= low).all():
-                near |= ((below <= high) & (above >= low)).all(axis=1)
+            if (below.min(axis=0) > high).any() or (above.max(axis=0) < low).any():
+                continue
+            rows = np.flatnonzero(((below <= high) & (above >= low)).all(axis=1))
+            self._tighten(rows, body)
+            meets = (self._low[rows, body] <= high) & (self._high[rows, body] >= low)
+            near[rows[meets.all(axis=1)]] = True
         return near

@@ -82,7 +82,7 @@ def _job(
             Proposal(row={"cause": ""}, loaded=coarse(cells[k], share)) for k in kept
         ]
         found = stages.run(f"coarse_{number + 1}", job, units)
-        out = _poor(kept, found, base, name, requirements)
+        out = poor(kept, found, base, name, requirements)
         causes |= out
         kept = [k for k in kept if k not in out]
     return Job(
@@ -92,7 +92,7 @@ def _job(
     )
 
 
-def _poor(
+def poor(
     kept: Sequence[int],
     found: Sequence[Mapping[str, Any]],
     base: int,

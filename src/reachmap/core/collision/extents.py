@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from reachmap._typing import FloatArray, IntArray
-from reachmap.cell.model.shapes import corner_points
+from reachmap.cell.model.shapes import Solid, corner_points
+from reachmap.core.collision.shapes import convex_hull
 
 if TYPE_CHECKING:
     from reachmap.core.collision.bodies import BodyGeometry
@@ -34,6 +35,8 @@ class Extents:
         Of the line in the middle of the capsule [m].
     radius : array, shape (bodies,)
         Of the capsule [m].
+    corners : tuple of array, shape (n, 3)
+        Of the convex hull of each body [m].
     """
 
     body: IntArray
@@ -42,19 +45,21 @@ class Extents:
     half: FloatArray
     ends: FloatArray
     radius: FloatArray
+    corners: tuple[FloatArray, ...]
 
     @classmethod
     def of(cls, chain: SerialChain, model: Any, bodies: BodyGeometry) -> Extents:
         """Extents of the bodies of a cell; ``model`` is that of the chain's joints."""
         frames = chain.joint_rotations(model)
-        found = []
+        found, corners = [], []
         objects = bodies.geometry.geometryObjects
         for k, (body, shape) in enumerate(zip(objects, bodies.shapes, strict=True)):
             joint = int(body.parentJoint) - 1
             if 0 <= joint < chain.dof:
-                points = corner_points(shape) @ body.placement.rotation.T
+                points = _hull_corners(shape) @ body.placement.rotation.T
                 points = (points + body.placement.translation) @ frames[joint]
                 found.append((k, joint, *_box(points), *_capsule(points)))
+                corners.append(points)
         columns = zip(*found, strict=True) if found else [[] for _ in range(6)]
         body_, joint_, centre, half, ends, radius = (np.array(c) for c in columns)
         return cls(
@@ -64,6 +69,7 @@ class Extents:
             half=half.reshape(-1, 3),
             ends=ends.reshape(-1, 2, 3),
             radius=radius.astype(float),
+            corners=tuple(corners),
         )
 
     def boxes(self, T_base_joint: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -78,6 +84,26 @@ class Extents:
             np.maximum(middle - room, ends.min(axis=-1) - radius),
             np.minimum(middle + room, ends.max(axis=-1) + radius),
         )
+
+    def tight(
+        self, T_base_joint: FloatArray, body: int
+    ) -> tuple[FloatArray, FloatArray]:
+        """The same (n, 3) around the corners of one body, which takes longer."""
+        T = T_base_joint[:, self.joint[body]]
+        sides = [T[:, axis, :3] @ self.corners[body].T for axis in range(3)]
+        origin = T[:, :3, 3]
+        low, high = (
+            np.stack([bound(side, axis=1) for side in sides], axis=1) + origin
+            for bound in (np.min, np.max)
+        )
+        return low, high
+
+
+def _hull_corners(shape: Solid) -> FloatArray:
+    """Corners of the convex body that checks with a margin are made with."""
+    points = corner_points(shape)
+    hull = convex_hull(points)
+    return points if hull is None else np.array(hull.points())
 
 
 def _box(points: FloatArray) -> tuple[FloatArray, FloatArray]:

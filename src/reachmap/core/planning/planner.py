@@ -18,6 +18,7 @@ import numpy as np
 
 from reachmap._typing import FloatArray
 from reachmap.cell.model.planner import PlannerSpec
+from reachmap.core.memo import remembered_part
 from reachmap.core.planning.motion import MotionChecker
 from reachmap.core.planning.ompl import Budget, FoundPath, OmplSearch
 from reachmap.core.planning.shortcut import shorten
@@ -107,6 +108,19 @@ class Planner:
         max_checks : int, optional
             Budget in state checks; default: the cell's.
         """
+        return remembered_part(
+            "plan",
+            lambda: self._plan(start, goals, seed, max_checks),
+            self.spec.model_dump_json(),
+            start,
+            goals,
+            seed,
+            max_checks,
+        )
+
+    def _plan(
+        self, start: FloatArray, goals: FloatArray, seed: int, max_checks: int | None
+    ) -> PlanResult:
         robot, starts = self.motions.checker.robot, np.atleast_2d(start)
         inside = ((goals >= robot.lower_rad) & (goals <= robot.upper_rad)).all(axis=1)
         rows = np.flatnonzero(inside)

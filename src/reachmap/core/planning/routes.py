@@ -15,12 +15,14 @@ import heapq
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from reachmap._typing import FloatArray, IntArray
 from reachmap.cell.model.roadmap import RoadmapSpec
+from reachmap.core.memo import remembered_part
 from reachmap.core.planning.motion import MotionChecker
 from reachmap.core.planning.planner import Planner
 from reachmap.core.planning.shortcut import cut_corners, skip_waypoints
@@ -231,7 +233,19 @@ def build_network(
     """
     motions, rng = planners[0].motions, np.random.default_rng([seed, len(routes)])
     rough = _ROUGH * spec.least_gain
-    routes = [shorten_until(route, motions, rng, rough) for route in routes]
+
+    def shortened(route: FloatArray) -> FloatArray:
+        def compute() -> tuple[FloatArray, Any]:
+            short = shorten_until(route, motions, rng, rough)
+            return short, rng.bit_generator.state
+
+        begin = str(rng.bit_generator.state)
+        short, rng.bit_generator.state = remembered_part(
+            "shorten", compute, route, begin
+        )
+        return short
+
+    routes = [shortened(route) for route in routes]
     bent = [k for k, route in enumerate(routes) if not _is_straight(route, goals[k])]
     more = []
     for number in range(spec.route_plans if bent else 0):
@@ -240,15 +254,21 @@ def build_network(
             routes[k][0], goals[k], int(rng.integers(1, 2**31))
         )
         if plan.path is not None:
-            more.append(shorten_until(plan.path, motions, rng, rough))
-    network = RouteNetwork.of([*routes, *more], motions)
+            more.append(shortened(plan.path))
+    network = _network_of([*routes, *more], motions)
     for _ in range(spec.route_rounds if bent else 0):
         better = []
         for k, route in enumerate(routes):
             ways = network.ways_to(goals[k], motions, spec) if k in bent else []
-            better += [shorten_until(w, motions, rng, rough) for w in ways or [route]]
-        network = RouteNetwork.of(better, motions)
+            better += [shortened(way) for way in ways or [route]]
+        network = _network_of(better, motions)
     return network
+
+
+def _network_of(routes: Sequence[FloatArray], motions: MotionChecker) -> RouteNetwork:
+    return remembered_part(
+        "network", lambda: RouteNetwork.of(routes, motions), list(routes)
+    )
 
 
 def _is_straight(route: FloatArray, goals: FloatArray) -> bool:
