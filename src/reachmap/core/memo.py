@@ -153,39 +153,47 @@ class Memo:
     def _result(
         self, key: str, within: _Within, compute: Callable[[], Result]
     ) -> Result:
-        scene, outer = within.scene, Trace.current
-        checker, before = scene.checker, scene.checker.checks
+        checker, outer = within.scene.checker, Trace.current
+        before = checker.checks
+        known = self._taken_over(key, within)
+        if known is None:
+            self.computed += 1
+            trace = Trace(checker)
+            with trace.recording():
+                result = compute()
+            known = _Known(
+                surroundings=within.surroundings,
+                trace=trace,
+                result=result,
+                checks=checker.checks - before,
+            )
+            if trace.is_whole:
+                self._known.setdefault(key, []).append(known)
+                self._questions += len(trace)
+                self._forget_oldest()
+        else:
+            self.found += 1
+            # Budgets count what a computation checks, whoever has done it.
+            checker.checks = before + known.checks
+        if outer is not None:
+            outer.include(known.trace)
+        found: Result = known.result
+        return found
+
+    def _taken_over(self, key: str, within: _Within) -> _Known | None:
+        """What another cell has found, if it is the same here."""
         entries = self._known.setdefault(key, [])
         self._known.move_to_end(key)
-        for known in reversed(entries):
-            changed = known.surroundings.changed(within.surroundings)
-            repeats = known.trace.repeats_in(scene, changed)
-            # Budgets count what a computation checks, whoever has done it.
-            checker.checks = before + (known.checks if repeats else 0)
-            if repeats:
-                self.found += 1
-                if outer is not None:
-                    outer.include(known.trace)
-                result: Result = known.result
-                return result
-        self.computed += 1
-        trace = Trace(checker)
-        with trace.recording():
-            result = compute()
-        if outer is not None:
-            outer.include(trace)
-        if trace.is_whole:
-            entries.append(
-                _Known(
-                    surroundings=within.surroundings,
-                    trace=trace,
-                    result=result,
-                    checks=checker.checks - before,
-                )
-            )
-            self._questions += len(trace)
-            self._forget_oldest()
-        return result
+        # What is asked again now is no question of a computation.
+        outer, Trace.current = Trace.current, None
+        try:
+            for known in reversed(entries):
+                changed = known.surroundings.changed(within.surroundings)
+                if known.trace.repeats_in(within.scene, changed):
+                    return known
+        finally:
+            Trace.current = outer
+        return None
 
     def _forget_oldest(self) -> None:
         while self._questions > self._most and self._known:

@@ -11,16 +11,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from functools import partial
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from reachmap._typing import BoolArray, FloatArray, IntArray
+from reachmap._typing import BoolArray, FloatArray
 
 if TYPE_CHECKING:
     from reachmap.core.collision.checker import CollisionChecker
-    from reachmap.core.collision.displacement import MotionBound
     from reachmap.core.scene import Scene
 
 Box = tuple[FloatArray, FloatArray]
@@ -61,8 +59,6 @@ class Trace:
         self._parts: list[Trace] = []
         self._Q, self._kind = np.zeros((0, 0)), np.zeros(0, np.int8)
         self._low = self._high = np.zeros((0, 0, 3), np.float32)
-        self._margin_m, self._is_tight = np.zeros((0, 0)), np.zeros((0, 0), bool)
-        self._bound: MotionBound | None = None
 
     def __len__(self) -> int:
         """Questions about configurations, without those of parts."""
@@ -109,36 +105,14 @@ class Trace:
         self._Q = np.frombuffer(b"".join(self._q)).reshape(len(self._q), -1)
         self._kind = np.array(self._about, np.int8)
         self._q, self._about = [], []
-        bound = self._bound = checker.bound
-        self._is_tight = np.zeros((len(self._Q), len(checker.bound.on_chain)), bool)
-        self._margin_m = checker.margins_m(self._kind) + ROUNDING_M
-        self._low, self._high = self._in_blocks(
-            bound.boxes, np.arange(len(self._Q)), self._margin_m[..., None]
-        )
-
-    def _in_blocks(
-        self, boxes: Callable[[FloatArray], Box], rows: IntArray, margin_m: FloatArray
-    ) -> Any:
-        """Low and high corners, at some questions, with a margin around them."""
+        margin_m = checker.margins_m(self._kind)[..., None] + ROUNDING_M
         parts = []
-        for begin in range(0, len(rows), BLOCK):
-            block = rows[begin : begin + BLOCK]
-            low, high = boxes(self._Q[block])
+        for begin in range(0, len(self._Q), BLOCK):
+            block = slice(begin, begin + BLOCK)
+            low, high = checker.bound.boxes(self._Q[block])
             around = np.stack([low - margin_m[block], high + margin_m[block]])
             parts.append(around.astype(np.float32))
-        return np.concatenate(parts, axis=1)
-
-    def _tighten(self, rows: IntArray, body: int) -> None:
-        """Find smaller boxes around a body at some questions, once."""
-        assert self._bound is not None
-        rows = rows[~self._is_tight[rows, body]]
-        if len(rows):
-            self._is_tight[rows, body] = True
-            self._low[rows, body], self._high[rows, body] = self._in_blocks(
-                partial(self._bound.tight_boxes, body=body),
-                rows,
-                self._margin_m[:, body, None],
-            )
+        self._low, self._high = np.concatenate(parts, axis=1)
 
     def repeats_in(self, scene: Scene, changed: Sequence[tuple[str, Box]]) -> bool:
         """Whether another cell gives the same answers, all of them.
@@ -179,10 +153,6 @@ class Trace:
         low, high = box
         for body in bodies:
             below, above = self._low[:, body], self._high[:, body]
-            if (below.min(axis=0) > high).any() or (above.max(axis=0) < low).any():
-                continue
-            rows = np.flatnonzero(((below <= high) & (above >= low)).all(axis=1))
-            self._tighten(rows, body)
-            meets = (self._low[rows, body] <= high) & (self._high[rows, body] >= low)
-            near[rows[meets.all(axis=1)]] = True
+            if (below.min(axis=0) <= high).all() and (above.max(axis=0) >= low).all():
+                near |= ((below <= high) & (above >= low)).all(axis=1)
         return near

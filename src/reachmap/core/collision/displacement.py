@@ -126,10 +126,6 @@ class MotionBound:
         """
         return self._extents.boxes(self._chain.joint_frames_many(Q))
 
-    def tight_boxes(self, Q: FloatArray, body: int) -> tuple[FloatArray, FloatArray]:
-        """Smaller boxes (n, 3) around one of the bodies, which take longer."""
-        return self._extents.tight(self._chain.joint_frames_many(Q), body)
-
     def _speed_m(self, Q: FloatArray, half_change: FloatArray) -> FloatArray:
         """Fastest point on each joint at the middles of motions, shape (n, dof)."""
         frames = self._chain.joint_frames_many(Q)
