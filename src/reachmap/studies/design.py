@@ -153,12 +153,13 @@ def _factor(text: str, base: LoadedCell, sampled: bool) -> Factor:
 def _require_known(name: str, base: LoadedCell) -> None:
     """Refuse what is neither a parameter of the cell nor begins one of its keys."""
     parameters, keys = base.cell.parameters, json.loads(base.resolved_json)
-    if name in parameters or name.partition(".")[0] in keys:
+    first = name.partition(".")[0]
+    if name in parameters or first in keys:
         return
     known = ", ".join(parameters) or "it has none"
     raise SettingsError(
         f"--vary {name:.60}: neither a parameter of the cell ({known}) nor one of its "
-        f"keys; {did_you_mean(name, [*parameters, *keys])}"
+        f"keys; {did_you_mean(first, [*parameters, *keys])}"
     )
 
 
