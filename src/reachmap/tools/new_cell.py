@@ -130,7 +130,7 @@ def new_cell(
     inputs = [folder / name for name in (source.srdf, source.joint_limits) if name]
     check_output(target, overwrite=overwrite, inputs=inputs)
     attempt = _Attempt(folder, source, _first_choices(source, base, tip))
-    if tip is None and source.moveit is None:
+    if tip is None:
         others = guesses.other_tips(
             source.robot, attempt.choices.base, attempt.choices.tip
         )
