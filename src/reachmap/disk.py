@@ -6,7 +6,9 @@ be looked into, and for links that lead to themselves; for a user nothing is the
 
 from __future__ import annotations
 
+import errno
 import os
+import stat
 from pathlib import Path
 
 
@@ -55,6 +57,24 @@ def is_text(name: str) -> bool:
         # The locale cannot spell it, which does not keep it from being stored.
         return not any("\ud800" <= letter <= "\udfff" for letter in name)
     return True
+
+
+def read_up_to(path: Path | str, limit: int) -> bytes | None:
+    """Contents of a file or a pipe; None where there are more bytes than that.
+
+    Raises
+    ------
+    OSError
+        It cannot be read, or is a device, which may have no end.
+    """
+    found = os.stat(path)  # noqa: PTH116
+    if stat.S_ISCHR(found.st_mode) or stat.S_ISBLK(found.st_mode):
+        raise OSError(errno.EINVAL, "is a device")
+    if found.st_size > limit:
+        return None
+    with Path(path).open("rb") as stream:  # a pipe does not say how long it is
+        data = stream.read(limit + 1)
+    return data if len(data) <= limit else None
 
 
 def as_path(name: str | Path | None) -> Path | None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import logging
+import os
 
 import numpy as np
 import pytest
@@ -108,3 +109,10 @@ def test_a_round_trip_keeps_every_number(tmp_path):
     path = tmp_path / "c.json"
     path.write_text(json.dumps(made.document()))
     assert read_calibration(path, "a" * 64).document() == made.document()
+
+
+def test_a_pipe_in_the_place_of_a_calibration_is_refused(map_path):
+    """Nobody waits for what may never come."""
+    os.mkfifo(calibration_beside(map_path))
+    with pytest.raises(MapFileError, match="not a regular file"):
+        Ranker.from_map(map_path)

@@ -78,6 +78,12 @@ def test_a_missing_file_says_what_makes_it(tmp_path: Path) -> None:
     assert "`reachmap place-bin` makes" in message
 
 
+def test_a_device_is_not_read_to_its_end(tmp_path: Path) -> None:
+    """It may have none; a link to one is one."""
+    (tmp_path / "bin.h5").symlink_to("/dev/zero")
+    assert "is a device" in error_of(read_bin_map, tmp_path / "bin.h5")
+
+
 @pytest.mark.parametrize(
     ("content", "message"),
     [

@@ -10,6 +10,7 @@ from typing import Generic, TypeVar
 
 import numpy as np
 
+from reachmap.disk import read_up_to
 from reachmap.errors import EngineError, MapFileError, ReachmapError
 from reachmap.maps.bytes.hashing import content_sha256, integrity_sha256
 from reachmap.maps.bytes.hdf5 import (
@@ -251,14 +252,13 @@ def _damaged(
 def read_bytes(path: Path, layouts: Sequence[Layout] = ()) -> bytes:
     """Read a file, in words a user can act on when that fails."""
     try:
-        size = Path(path).stat().st_size
-        data = Path(path).read_bytes() if size <= MAX_BYTES else b""
+        data = read_up_to(path, MAX_BYTES)
     except FileNotFoundError as error:
         raise MapFileError(f"{path}: no such file; {_expected(layouts)}") from error
     except OSError as error:
         reason = error.strerror or type(error).__name__
         raise MapFileError(f"{path}: cannot be read ({reason})") from error
-    if size > MAX_BYTES:
+    if data is None:
         raise MapFileError(f"{path}: larger than {MAX_BYTES >> 30} GiB")
     return data
 

@@ -16,7 +16,7 @@ from typing import Any, Final
 import numpy as np
 
 from reachmap._typing import FloatArray
-from reachmap.disk import is_there
+from reachmap.disk import is_file, is_folder, is_there
 from reachmap.errors import MapFileError
 from reachmap.maps.parts import freeze
 from reachmap.maps.records import Stamp
@@ -25,6 +25,8 @@ logger = logging.getLogger(__name__)
 
 FORMAT: Final = "reachmap.calibration"
 FORMAT_VERSION: Final = "1.0"
+# A thousand times what a calibration by a thousand grasps takes.
+MAX_BYTES: Final = 16 * 2**20
 
 
 class AnotherMapError(MapFileError):
@@ -114,8 +116,12 @@ def read_calibration(path: str | Path, map_sha256: str) -> Calibration:
     MapFileError
         The file is none, is damaged, or was made for another map.
     """
+    path = Path(path)
+    if is_there(path) and not (is_file(path) or is_folder(path)):
+        raise MapFileError(f"{path}: is not a regular file")
     try:
-        document = json.loads(Path(path).read_bytes())
+        with path.open("rb") as stream:
+            document = json.loads(stream.read(MAX_BYTES))
     except OSError as error:
         raise MapFileError(f"{path}: cannot be read: {error.strerror}") from None
     except (ValueError, RecursionError):
