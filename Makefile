@@ -50,7 +50,7 @@ test-slow: $(VENV)/.dev ## Run the tests that take minutes
 	$(BIN)/python -m pytest -n $(JOBS) -m slow --hypothesis-profile=explore
 
 test-lowest: $(TOOLS)/uv ## Run the default suite with the oldest dependencies that are allowed
-	$(TOOLS)/uv pip compile -q --resolution lowest-direct --only-binary :all: --extra test pyproject.toml \
+	$(TOOLS)/uv pip compile -q --resolution lowest-direct --only-binary :all: --extra test --extra docs pyproject.toml \
 	    --python-version 3.11 -o build/lowest.txt
 	$(TOOLS)/uv venv -q --seed --clear --python 3.11 build/lowest
 	$(TOOLS)/uv pip install -q --python build/lowest/bin/python -r build/lowest.txt
