@@ -53,11 +53,17 @@ def test_what_is_missing_alone_is_made_again(folder: Path) -> None:
     before = (made / "workspace.h5").read_bytes()
     content = read_bin_map(made / "bin.h5").stamp.content_sha256
     (made / "bin.h5").unlink()
+    pictures = sorted((made / "pictures").iterdir())
+    pictures[0].unlink()
     answer = json.loads(run("-o", made, "--json").stdout)
     assert answer["made"] == [str(made / "bin.h5")]
     assert answer["kept"] == [str(made / "workspace.h5"), str(made / "placement.h5")]
     assert (made / "workspace.h5").read_bytes() == before
     assert read_bin_map(made / "bin.h5").stamp.content_sha256 == content
+    pictures[0].unlink()
+    kept = json.loads(run("-o", made, "--json").stdout)
+    assert (kept["made"], len(kept["kept"])) == ([], 3)
+    assert sorted((made / "pictures").iterdir()) == pictures
 
 
 def test_another_cells_folder_is_refused(folder: Path) -> None:

@@ -125,16 +125,15 @@ def run_pipeline(
         ),
         lambda options: bin_scan(placement, bin_map, run=options),
     )
-    page = _told(folder, grasps, redraw=bool(chain.made))
+    page = _told(folder, grasps)
     return PipelineAnswer(made=tuple(chain.made), kept=tuple(chain.kept), report=page)
 
 
-def _told(folder: Path, grasps: Sequence[str | Path], *, redraw: bool) -> Path:
+def _told(folder: Path, grasps: Sequence[str | Path]) -> Path:
     """Draw the maps of a folder, rank grasps with them, and report; the page."""
-    pictures = folder / "pictures"
-    if redraw or not pictures.exists():
-        for name in MAPS:
-            heatmap(folder / name, output=pictures, overwrite=True)
+    # Always: an earlier run may have been killed among the pictures.
+    for name in MAPS:
+        heatmap(folder / name, output=folder / "pictures", overwrite=True)
     if grasps:
         rank(
             grasps,
