@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from reachmap.cell.loading import LoadedCell, read_cell
+from reachmap.core import trace
 from reachmap.core.memo import Memo, fingerprint, remembered
 from reachmap.core.scene import Scene
 from reachmap.core.trace import Trace
@@ -133,3 +134,17 @@ def test_the_oldest_results_are_forgotten() -> None:
         for key in ("a", "b", "c", "d", "a", "d"):
             remembered(key, scene, lambda: scene.checker.is_free(q))
     assert (memo.found, memo.computed) == (1, 5)
+
+
+def test_a_computation_that_asks_very_much_is_not_kept(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Its questions take no room, and its result is computed each time."""
+    monkeypatch.setattr(trace, "MOST_QUESTIONS", 3)
+    scene, memo = Scene.build(toy(), with_bin=False), Memo()
+    Q = np.zeros((4, 3))
+    with memo.at_work():
+        for _ in range(2):
+            remembered("few", scene, partial(asked, scene, Q[:3]))
+            remembered("many", scene, partial(asked, scene, Q))
+    assert (memo.found, memo.computed) == (1, 3)

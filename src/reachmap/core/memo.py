@@ -14,15 +14,13 @@ import numpy as np
 
 from reachmap.core.collision.bodies import world_placements, world_shapes
 from reachmap.core.collision.static_bodies import box_around
-from reachmap.core.trace import Box, Trace
+from reachmap.core.trace import MOST_QUESTIONS, Box, Trace
 
 if TYPE_CHECKING:
     from reachmap.cell.loading import LoadedCell
     from reachmap.core.scene import Scene
 
 Result = TypeVar("Result")
-# About 250 bytes a question: what a process keeps stays well below a gigabyte.
-MOST_QUESTIONS = 2_000_000
 # What a cell is called, and how its numbers were written.
 NEVER_READ = ("name", "description", "parameters", "expressions")
 

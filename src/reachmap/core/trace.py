@@ -27,6 +27,8 @@ FREE, TOUCHING = -1, -2
 """What was asked of a configuration; a number from 0 on is a rung of the ladder."""
 # Boxes are kept in single precision: a micrometre covers the rounding.
 ROUNDING_M = 1e-6
+# About 300 bytes a question: what a process keeps stays well below a gigabyte.
+MOST_QUESTIONS = 2_000_000
 # Configurations at a time, for the sake of memory.
 BLOCK = 4096
 
@@ -37,8 +39,8 @@ class Trace:
     Parameters
     ----------
     checker : CollisionChecker
-        Whom they are put to. Where another one is asked as well, the trace is not whole
-        and says nothing about other cells.
+        Whom they are put to. Where another one is asked as well, or very much is asked,
+        the trace is not whole and says nothing about other cells.
 
     Attributes
     ----------
@@ -83,8 +85,12 @@ class Trace:
         self, checker: CollisionChecker, about: int, q: FloatArray, answer: Any
     ) -> None:
         """Note what a checker answered about a configuration (dof,)."""
-        if checker is not self._checker:
+        if checker is not self._checker or len(self._answers) == MOST_QUESTIONS:
             self.is_whole = False
+            # What is no use takes no room.
+            self._q, self._about, self._answers = [], [], []
+        if not self.is_whole:
+            return
         self._q.append(np.asarray(q, float).tobytes())
         self._about.append(about)
         self._answers.append(answer)
