@@ -225,8 +225,8 @@ def remembered_part(name: str, compute: Callable[[], Result], *args: Any) -> Res
         Of the computation.
     compute : callable
         Its result must not be changed afterwards.
-    *args : array, number or text, or sequence of these
-        All that it depends on besides the cell.
+    *args : array, number, text or state of a generator, or sequence of these
+        All that it depends on besides the cell. Looked at where a memo is at work only.
     """
     if Memo.current is None:
         return compute()

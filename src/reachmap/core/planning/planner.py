@@ -85,6 +85,7 @@ class Planner:
     def __init__(self, motions: MotionChecker, spec: PlannerSpec) -> None:
         self.motions = motions
         self.spec = spec
+        self._spec_text = spec.model_dump_json()
         self._ompl = OmplSearch(motions, spec)
 
     def plan(
@@ -111,7 +112,7 @@ class Planner:
         return remembered_part(
             "plan",
             lambda: self._plan(start, goals, seed, max_checks),
-            self.spec.model_dump_json(),
+            self._spec_text,
             start,
             goals,
             seed,

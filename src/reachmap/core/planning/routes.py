@@ -239,9 +239,8 @@ def build_network(
             short = shorten_until(route, motions, rng, rough)
             return short, rng.bit_generator.state
 
-        begin = str(rng.bit_generator.state)
         short, rng.bit_generator.state = remembered_part(
-            "shorten", compute, route, begin
+            "shorten", compute, route, rng.bit_generator.state
         )
         return short
 

@@ -7,7 +7,7 @@ import hashlib
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -203,14 +203,14 @@ class Prepared:
     """
 
     def __init__(self, context: tuple[LoadedCell, BoolArray, Placing]) -> None:
-        loaded, self._is_open, self._placing = context
-        self._key = self._fingerprint(loaded)
-        self._scene = self._placing.scene(loaded)
+        self._loaded, self._is_open, self._placing = context
+        self._scene = self._placing.scene(self._loaded)
         self._samples: dict[Grid, Sample] = {}
         self._at: tuple[Grid, Pose] | None = None
         self._placed: PlacedScene | None = None
 
-    def _fingerprint(self, loaded: LoadedCell) -> str:
+    @cached_property
+    def _key(self) -> str:
         """What a score depends on besides the request and what stands around.
 
         "" where the pose is not that of the bin: then what stands around moves.
@@ -219,7 +219,9 @@ class Prepared:
             return ""
         # Where the bin stands is what is asked.
         known = fingerprint(
-            loaded, without=("bin.pose", "bin.frame", "bin.on"), surroundings=False
+            self._loaded,
+            without=("bin.pose", "bin.frame", "bin.on"),
+            surroundings=False,
         )
         seen = hashlib.sha256(self._is_open.tobytes()).hexdigest()
         return f"pose {known} {seen}"
@@ -228,7 +230,7 @@ class Prepared:
         self, unit: tuple[Request, float], compute: Callable[[], dict[str, Any]]
     ) -> dict[str, Any]:
         """Score a pose, or take it over from a cell in which the score is the same."""
-        if not self._key or Memo.current is None:
+        if Memo.current is None or not self._key:
             return compute()
         # What is computed for a unit is asked in it.
         self._placed = self._at = None
