@@ -58,6 +58,24 @@ def axis_vector(axis: str) -> FloatArray:
     return vector
 
 
+def axis_rotations(axis: str, angles_rad: FloatArray) -> FloatArray:
+    """Rotations about a signed axis, shape (n, 3, 3).
+
+    Parameters
+    ----------
+    axis : str
+        As in ``"-z"``.
+    angles_rad : array, shape (n,)
+    """
+    column, sign = AXES[axis]
+    after, last = (column + 1) % 3, (column + 2) % 3
+    cosine, sine = np.cos(angles_rad), sign * np.sin(angles_rad)
+    R = np.tile(np.eye(3), (len(angles_rad), 1, 1))
+    R[:, after, after], R[:, last, last] = cosine, cosine
+    R[:, last, after], R[:, after, last] = sine, -sine
+    return R
+
+
 def inverse_transform(T: FloatArray) -> FloatArray:
     """Invert rigid transforms, shape (..., 4, 4)."""
     R_t = np.swapaxes(T[..., :3, :3], -1, -2)

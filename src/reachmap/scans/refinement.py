@@ -18,7 +18,11 @@ from reachmap._typing import FloatArray, IntArray
 from reachmap.cell.model.cell import Cell
 from reachmap.cell.model.tool import FREE
 from reachmap.core.scene import Scene
-from reachmap.geometry import quaternion_wxyz_from_rotation, transform_from_parts
+from reachmap.geometry import (
+    axis_rotations,
+    quaternion_wxyz_from_rotation,
+    transform_from_parts,
+)
 from reachmap.maps.parts import Refinement
 from reachmap.maps.records import Status
 from reachmap.ranking.lookup.approach import complete_rotation
@@ -29,7 +33,7 @@ from reachmap.sampling.regression import GraspRegression
 from reachmap.sampling.volume import GraspVolume
 from reachmap.scans.bin_roadmap import lengths_over_roadmap
 from reachmap.scans.ik_survey import Survey, join_surveys, survey_frames
-from reachmap.scans.rolls import RollGroups, roll_rotations
+from reachmap.scans.rolls import RollGroups
 
 if TYPE_CHECKING:
     from reachmap.cell.loading import LoadedCell
@@ -211,7 +215,7 @@ def _verdicts(
     return Refinement(
         position=T[:, :3, 3].copy(),
         quaternion_wxyz=quaternion_wxyz_from_rotation(
-            T[:, :3, :3] @ roll_rotations(axis, roll)
+            T[:, :3, :3] @ axis_rotations(axis, roll)
         ),
         status=status,
         lever_m=lever_of(scene.loaded.cell),

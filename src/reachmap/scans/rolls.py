@@ -11,7 +11,7 @@ import numpy as np
 from reachmap._typing import FloatArray, IntArray
 from reachmap.cell.model.tool import FREE, ToolSpec
 from reachmap.core.kinematics.windings import TURN_RAD
-from reachmap.geometry import AXES
+from reachmap.geometry import AXES, axis_rotations
 from reachmap.maps.records import NO_PAIR, Status
 from reachmap.maps.summary.directions import same_direction
 from reachmap.sampling.frames import FrameGrid
@@ -92,7 +92,7 @@ class RollGroups:
     def turned(self, groups: IntArray, turns: FloatArray, axis: str) -> FloatArray:
         """Poses of groups at some rolls, shape (groups · rolls, 4, 4)."""
         T_roll = np.tile(np.eye(4), (len(turns), 1, 1))
-        T_roll[:, :3, :3] = roll_rotations(axis, turns)
+        T_roll[:, :3, :3] = axis_rotations(axis, turns)
         T = self.T[groups][:, None] @ T_roll
         return np.asarray(T.reshape(-1, 4, 4))
 
@@ -203,17 +203,6 @@ def _roll_between(R_from: FloatArray, R_to: FloatArray, axis: str) -> float:
     R = R_from.T @ R_to
     after, last = (column + 1) % 3, (column + 2) % 3
     return sign * float(np.arctan2(R[last, after], R[after, after]))
-
-
-def roll_rotations(axis: str, angles_rad: FloatArray) -> FloatArray:
-    """Rotations about the approach axis, shape (n, 3, 3)."""
-    column, sign = AXES[axis]
-    after, last = (column + 1) % 3, (column + 2) % 3
-    cosine, sine = np.cos(angles_rad), sign * np.sin(angles_rad)
-    R = np.tile(np.eye(3), (len(angles_rad), 1, 1))
-    R[:, after, after], R[:, last, last] = cosine, cosine
-    R[:, last, after], R[:, after, last] = sine, -sine
-    return R
 
 
 def _turns(tool: ToolSpec) -> FloatArray:

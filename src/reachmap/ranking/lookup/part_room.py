@@ -19,6 +19,7 @@ import numpy as np
 from reachmap._typing import BoolArray, FloatArray
 from reachmap.errors import MapFileError
 from reachmap.geometry import (
+    axis_rotations,
     axis_vector,
     rotation_from_quaternion_wxyz,
 )
@@ -100,12 +101,15 @@ class PartRoom:
         R_base_tcp = np.where(queries.free[:, None, None], R_any, R_given)
         R_bin_base, shift = self.T_bin_base[:3, :3], self.T_bin_base[:3, 3]
         place = queries.points @ R_bin_base.T + shift
+        turns = axis_rotations(
+            self.approach_axis, 2.0 * np.pi * np.arange(_TURNS) / _TURNS
+        )
         found = np.zeros(len(queries), bool)
-        for turn in range(_TURNS):
+        for turn, R_turn in enumerate(turns):
             asked = np.flatnonzero(~found & (queries.free | (turn == 0)))
             if not len(asked):
                 break
-            turned = self.corners @ _about(axis, 2.0 * np.pi * turn / _TURNS).T
+            turned = self.corners @ R_turn.T
             R_bin_tcp = R_bin_base @ R_base_tcp[asked]
             corners = turned @ R_bin_tcp.transpose(0, 2, 1) + place[asked, None]
             found[asked] = self._holds(corners)
@@ -158,12 +162,3 @@ def _greatest_below(values: FloatArray, z: FloatArray, limit: float) -> FloatArr
         crossed = start + share * (values[row, over] - start)
         greatest[row] = max(greatest[row], float(crossed.max()))
     return np.asarray(greatest)
-
-
-def _about(axis: FloatArray, angle: float) -> FloatArray:
-    """Rotation about a coordinate axis, either way round, (3, 3)."""
-    x, y, z = axis
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.asarray(
-        np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross
-    )
