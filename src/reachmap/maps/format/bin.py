@@ -17,8 +17,10 @@ from reachmap.maps.format.assembly import (
 from reachmap.maps.format.bin_checks import check_bin
 from reachmap.maps.format.layout import (
     COMMON_SCALES,
+    GRASP,
     NONNEGATIVE,
     PERCENT,
+    POINT,
     SCAN,
     Layout,
     Variable,
@@ -36,9 +38,7 @@ from reachmap.maps.summary.directions import reachability_of_directions
 INDEX_COLUMNS = ("layer", "y", "x", "orientation", "repeat")
 """What the columns of ``/paths/index`` count."""
 
-_POINT = ("layer", "y", "x")
-_GRASP = (*_POINT, "orientation")
-_TRY = (*_GRASP, "repeat")
+_TRY = (*GRASP, "repeat")
 
 
 def _measured(name: str, units: str, meaning: str) -> Variable:
@@ -58,7 +58,7 @@ BIN = Layout(
     sections=BIN_SECTIONS,
     title="Path reachability of test grasps in a bin",
     signal="path_reachability",
-    axes=_POINT,
+    axes=POINT,
     attributes={
         "approach_axis": "TCP axis that points into the object, as in `+z`.",
         "approach_distance_m": "Length of the straight approach; 0: none.",
@@ -77,7 +77,7 @@ BIN = Layout(
         index("pose_column", "Columns of a homogeneous matrix."),
         Variable(
             path="path_reachability",
-            dims=_POINT,
+            dims=POINT,
             dtype="f8",
             meaning="Share of test grasps with a collision-free path, Eq. (1).",
             nan=True,
@@ -103,7 +103,7 @@ BIN = Layout(
         SCAN,
         Variable(
             path="position",
-            dims=(*_POINT, "xyz"),
+            dims=(*POINT, "xyz"),
             dtype="f8",
             units="m",
             meaning="TCP position of the test grasps, d_test.",
@@ -111,16 +111,16 @@ BIN = Layout(
         ),
         Variable(
             path="quaternion_wxyz",
-            dims=(*_GRASP, "quat"),
+            dims=(*GRASP, "quat"),
             dtype="f8",
             units="1",
             meaning="TCP orientation of the test grasps, R_test, unit quaternion.",
             frame="robot_base",
         ),
-        *outcome("", _GRASP),
+        *outcome("", GRASP),
         Variable(
             path="connected",
-            dims=_GRASP,
+            dims=GRASP,
             dtype="u1",
             units="1",
             meaning="1 where the roadmap proves a path, found by an attempt or not.",
@@ -156,7 +156,7 @@ BIN = Layout(
             "Time optimum of the planned part and of the straight approach, at rest "
             "between them",
         ),
-        goal("", _GRASP, " on the shortest path"),
+        goal("", GRASP, " on the shortest path"),
         index("paths/path", "Stored paths."),
         index("paths/point", "Way-points of all stored paths."),
         index(

@@ -5,8 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 from reachmap.maps.format.layout import (
+    GRASP,
     NONNEGATIVE,
     PERCENT,
+    POINT,
     Section,
     Variable,
     index,
@@ -14,9 +16,7 @@ from reachmap.maps.format.layout import (
 )
 from reachmap.maps.parts import Cycle, StageStatus
 
-_POINT = ("layer", "y", "x")
-_GRASP = (*_POINT, "orientation")
-_STAGE = (*_GRASP, "stage")
+_STAGE = (*GRASP, "stage")
 
 
 def _stage(name: str, dtype: str, meaning: str, **more: Any) -> Variable:
@@ -53,7 +53,7 @@ CYCLE = Section(
         ),
         "drop_off": variable(
             "cycle/drop_off",
-            _GRASP,
+            GRASP,
             "i4",
             "Where the part goes, counted as in the cell; -1: nowhere.",
             low=-1,
@@ -61,7 +61,7 @@ CYCLE = Section(
         ),
         "cycle_time": variable(
             "cycle/cycle_time",
-            _GRASP,
+            GRASP,
             "f8",
             "Time of the whole cycle; NaN unless every stage has a path.",
             units="s",
@@ -69,7 +69,7 @@ CYCLE = Section(
         ),
         "reachability": variable(
             "cycle/cycle_reachability",
-            _POINT,
+            POINT,
             "f8",
             "Share of test grasps with a whole cycle, Eq. (1).",
             nan=True,

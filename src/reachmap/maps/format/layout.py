@@ -260,6 +260,9 @@ RUN_TEXTS = {
 
 PERCENT: Final[dict[str, Any]] = {"units": "percent", "low": 0.0, "high": 100.0}
 NONNEGATIVE: Final[dict[str, Any]] = {"low": 0.0, "nan": True}
+# Dimensions of what a bin map holds of each test point, and of each test grasp.
+POINT: Final = ("layer", "y", "x")
+GRASP: Final = (*POINT, "orientation")
 
 
 def variable(

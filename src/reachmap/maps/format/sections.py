@@ -6,8 +6,10 @@ from typing import Any, Final
 
 from reachmap.maps.format.cycle_sections import CYCLE_SECTIONS
 from reachmap.maps.format.layout import (
+    GRASP,
     NONNEGATIVE,
     PERCENT,
+    POINT,
     Section,
     Variable,
     index,
@@ -23,9 +25,7 @@ from reachmap.maps.parts import (
 )
 from reachmap.maps.records import Status
 
-_POINT = ("layer", "y", "x")
-_GRASP = (*_POINT, "orientation")
-_TRY = (*_GRASP, "repeat")
+_TRY = (*GRASP, "repeat")
 _ONE: Final[dict[str, Any]] = {"units": "1"}
 _POSE_SCALES = (
     index("pose_row", "Rows of a homogeneous matrix."),
@@ -113,7 +113,7 @@ COMPONENT = Section(
     arrays={
         "component": variable(
             "component",
-            _GRASP,
+            GRASP,
             "i4",
             "Connected component of the roadmap; -1: none.",
             low=-1,
@@ -127,7 +127,7 @@ ROLLS = Section(
     arrays={
         "direction_reachability": variable(
             "direction_reachability",
-            _POINT,
+            POINT,
             "f8",
             "Share of approach directions with a path for at least one roll.",
             nan=True,
@@ -135,7 +135,7 @@ ROLLS = Section(
         ),
         "point_reachability": variable(
             "point_reachability",
-            _POINT,
+            POINT,
             "f8",
             "100 where at least one direction has a path, 0 where none has.",
             nan=True,
@@ -149,7 +149,7 @@ WINNING_ROLL = Section(
     arrays={
         "winning_roll": variable(
             "winning_roll",
-            _GRASP,
+            GRASP,
             "f8",
             "Roll about the approach axis that the best path takes; NaN without one.",
             units="rad",
@@ -176,7 +176,7 @@ EFFORT = Section(
 
 
 def _of_best(name: str, units: str, meaning: str) -> Variable:
-    return variable(name, _GRASP, "f8", meaning, units=units, **NONNEGATIVE)
+    return variable(name, GRASP, "f8", meaning, units=units, **NONNEGATIVE)
 
 
 BEST = Section(
@@ -185,7 +185,7 @@ BEST = Section(
     arrays={
         "row": variable(
             "best_path",
-            _GRASP,
+            GRASP,
             "i4",
             "Row of /paths that a line would run; -1: none.",
             low=-1,
@@ -199,7 +199,7 @@ BEST = Section(
         ),
         "effort_checks": variable(
             "best_effort_checks",
-            _GRASP,
+            GRASP,
             "u4",
             "State checks that best_path took; 0: none.",
             **_ONE,
@@ -241,7 +241,7 @@ MARGINS = Section(
         ),
         "clearance_pair": variable(
             "clearance_pair",
-            _GRASP,
+            GRASP,
             "i4",
             "The two bodies that come closest, an index into body_pairs; -1: none.",
             low=-1,
