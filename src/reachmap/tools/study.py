@@ -119,15 +119,7 @@ def study(
     base = read_cell(cell, overrides)
     refuse_cell_files([output], base)
     _check_objectives(names, base)
-    if samples is not None and optimise is not None:
-        raise SettingsError("give --optimise or --latin-hypercube, not both")
-    if halving and optimise is not None:
-        raise SettingsError("--halving: --optimise leaves out what is poor by itself")
-    factors = factors_of(
-        vary, base, sampled=samples is not None, optimised=optimise is not None
-    )
-    if not factors:
-        raise SettingsError("nothing to vary: give --vary NAME=LOW:HIGH:N")
+    factors = _factors(vary, base, samples, optimise, halving=halving)
     for change in choices_of(factors):
         with suppress(CellError):  # of that variant, which gets a row with its cause
             refuse_cell_files([output], read_cell(cell, [*overrides, change]))
@@ -156,6 +148,27 @@ def study(
     outcome = run_scan(work, output=output, options=run, label="study")
     result: Study = outcome.artefact
     return result
+
+
+def _factors(
+    vary: Sequence[str],
+    base: LoadedCell,
+    samples: int | None,
+    optimise: int | None,
+    *,
+    halving: bool,
+) -> tuple[Factor, ...]:
+    """Read what is varied; ways to choose variants that exclude each other are told."""
+    if samples is not None and optimise is not None:
+        raise SettingsError("give --optimise or --latin-hypercube, not both")
+    if halving and optimise is not None:
+        raise SettingsError("--halving: --optimise leaves out what is poor by itself")
+    factors = factors_of(
+        vary, base, sampled=samples is not None, optimised=optimise is not None
+    )
+    if not factors:
+        raise SettingsError("nothing to vary: give --vary NAME=LOW:HIGH:N")
+    return factors
 
 
 @dataclass(frozen=True, slots=True)
