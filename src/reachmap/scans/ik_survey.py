@@ -95,6 +95,40 @@ class Survey:
             high=np.maximum.reduceat(self.way, self.way_begin),
         )
 
+    def ways(self) -> list[FloatArray]:
+        """Approach of each goal; see :meth:`way_of`."""
+        return [self.way_of(goal) for goal in range(len(self.frame))]
+
+    def with_goals(
+        self,
+        frame: IntArray,
+        roll: FloatArray,
+        ways: Sequence[FloatArray],
+        **others: Any,
+    ) -> Survey:
+        """Put other goals, in any order, in place of its own.
+
+        Parameters
+        ----------
+        frame : int array, shape (goals,)
+            Frame, or group of frames, of each.
+        roll : array, shape (goals,)
+        ways : sequence of array, shape (n, dof)
+            Approach of each.
+        **others
+            Other fields that change.
+        """
+        order = np.argsort(frame, kind="stable")
+        dof = self.way.shape[1]
+        return dataclasses.replace(
+            self,
+            frame=frame[order],
+            roll=roll[order],
+            way=np.vstack([np.zeros((0, dof)), *(ways[k] for k in order)]),
+            way_size=np.array([len(ways[k]) for k in order], np.int64),
+            **others,
+        )
+
     def payload(self) -> dict[str, Any]:
         """What a store keeps of it."""
         return {

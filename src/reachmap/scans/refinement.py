@@ -230,12 +230,4 @@ def _with_more(survey: Survey, grasps: IntArray, more: Survey) -> Survey:
     frame = np.concatenate([survey.frame[kept], grasps[more.frame]])
     roll = np.concatenate([survey.roll[kept], more.roll])
     ways = [survey.way_of(goal) for goal in kept.tolist()]
-    ways += [more.way_of(goal) for goal in range(len(more.frame))]
-    order = np.argsort(frame, kind="stable")
-    return dataclasses.replace(
-        survey,
-        frame=frame[order],
-        roll=roll[order],
-        way=np.vstack([ways[k] for k in order.tolist()]),
-        way_size=np.array([len(ways[k]) for k in order.tolist()], np.int64),
-    )
+    return survey.with_goals(frame, roll, [*ways, *more.ways()])

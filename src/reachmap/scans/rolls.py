@@ -99,7 +99,7 @@ class RollGroups:
     def share_goals(self, survey: Survey) -> Survey:
         """Let the frames of each group share their goals."""
         group, roll = self.group[survey.frame], self.roll[survey.frame]
-        return _with_goals(survey, self, group, roll, _ways(survey))
+        return _with_goals(survey, self, group, roll, survey.ways())
 
     def measured(self, survey: Survey, axis: str, T_goal: FloatArray) -> Survey:
         """Take the rolls of goals from their poses.
@@ -159,7 +159,7 @@ class RollGroups:
                 self,
                 np.concatenate([survey.frame, wanted[member]]),
                 np.concatenate([survey.roll, turns[turn]]),
-                [*_ways(survey), *_ways(found)],
+                [*survey.ways(), *found.ways()],
             )
             if until_found:
                 wanted = wanted[~np.isin(wanted, survey.frame)]
@@ -174,27 +174,19 @@ def _with_goals(
     ways: list[FloatArray],
 ) -> Survey:
     """A survey with other goals, which count for every frame of their group."""
-    order = np.argsort(group, kind="stable")
     goals = np.bincount(group, minlength=len(groups.T))[groups.group]
     n_free = np.maximum(survey.n_ik_free, np.minimum(goals, MAX_COUNT))
-    dof = survey.way.shape[1]
-    return dataclasses.replace(
-        survey,
+    return survey.with_goals(
+        group,
+        roll,
+        ways,
         status=np.where(goals, Status.NOT_ATTEMPTED, survey.status).astype(np.uint8),
         blocking_pair=np.where(goals, NO_PAIR, survey.blocking_pair),
         n_ik=np.maximum(survey.n_ik, n_free).astype(np.uint8),
         n_ik_free=n_free.astype(np.uint8),
-        frame=group[order],
-        way=np.vstack([np.zeros((0, dof)), *(ways[k] for k in order)]),
-        way_size=np.array([len(ways[k]) for k in order], np.int64),
         group=groups.group,
-        roll=roll[order],
         frame_roll=groups.roll,
     )
-
-
-def _ways(survey: Survey) -> list[FloatArray]:
-    return [survey.way_of(goal) for goal in range(len(survey.frame))]
 
 
 def _roll_between(R_from: FloatArray, R_to: FloatArray, axis: str) -> float:
