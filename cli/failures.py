@@ -90,6 +90,10 @@ def exit_code_of(run: Callable[[], Any], state: RunState) -> int:
 def _report(lines: Iterable[str], state: RunState) -> None:
     if state.debug:
         traceback.print_exc()
+    _complain(lines)
+
+
+def _complain(lines: Iterable[str]) -> None:
     for line in lines:
         click.echo(f"{program_name('red')} {line}", err=True)
 
@@ -116,6 +120,5 @@ def _interrupted(error: BaseException) -> int:
     # click hides the interrupt, and what it says about resuming, behind an Abort.
     cause = error.__cause__ if isinstance(error, click.Abort) else error
     message = str(cause or "").strip() or "interrupted"
-    for line in message.splitlines():
-        click.echo(f"{program_name('red')} {line}", err=True)
+    _complain(message.splitlines())
     return INTERRUPTED
