@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,8 +13,8 @@ from reachmap.maps.comparison.significance import benjamini_hochberg
 from reachmap.maps.records import RunInfo, Stamp, Status
 from reachmap.maps.study.format import write_study
 from reachmap.maps.study.record import LOWER_IS_BETTER, Study, VariantStatus
-from reachmap.runtime.job import Kind
-from reachmap.scans.document import provenance_from_document
+from reachmap.runtime.job import Job, Kind, Stages, Work
+from reachmap.scans.document import journal_settings, provenance_from_document
 from reachmap.studies.outcomes import (
     Change,
     Outcomes,
@@ -22,6 +22,9 @@ from reachmap.studies.outcomes import (
     compare_outcomes,
     is_met,
 )
+
+if TYPE_CHECKING:
+    from reachmap.cell.loading import LoadedCell
 
 VALUES = ("value", "low", "high")
 
@@ -178,3 +181,21 @@ def _best(name: str, value: FloatArray, feasible: BoolArray) -> tuple[int, int]:
 
 
 KIND = Kind(name="study", blank=blank, assemble=assemble, write=write_study)
+
+
+def work_on_cells(
+    cells: Sequence[LoadedCell],
+    units: Sequence[Any],
+    job: Callable[[Stages], Job],
+    document: dict[str, Any],
+) -> Work:
+    """Work of a study whose cells are known beforehand, with a unit for each."""
+    return Work(
+        kind=KIND,
+        units=units,
+        job=job,
+        settings=journal_settings(document)
+        | {"cells": [loaded.sha256 for loaded in cells]},
+        document=document,
+        frames=len(units),
+    )

@@ -10,8 +10,7 @@ from typing import Any
 from reachmap.cell.loading import LoadedCell
 from reachmap.maps.study.record import LOWER_IS_BETTER, OBJECTIVES
 from reachmap.runtime.job import Job, Stages, Work
-from reachmap.scans.document import journal_settings
-from reachmap.studies.assembly import KIND, failure, left_out, tally
+from reachmap.studies.assembly import failure, left_out, tally, work_on_cells
 from reachmap.studies.outcomes import Requirement, worth
 from reachmap.tools.variant import Proposal, VariantContext, compute_proposal
 
@@ -51,18 +50,16 @@ def halved_work(
         Cell that is always kept, for the others are compared with it; -1: none.
     requirements : sequence of Requirement
     """
-    return Work(
-        kind=KIND,
-        units=[
-            (k, Proposal(row={"cause": ""}, loaded=loaded))
-            for k, loaded in enumerate(cells)
-        ],
-        job=partial(_job, tuple(cells), context, base, tuple(requirements)),
-        settings=journal_settings(document)
-        | {"cells": [loaded.sha256 for loaded in cells]},
-        document=document,
-        frames=len(cells),
+    return work_on_cells(
+        cells,
+        [(k, _as_it_is(loaded)) for k, loaded in enumerate(cells)],
+        partial(_job, tuple(cells), context, base, tuple(requirements)),
+        document,
     )
+
+
+def _as_it_is(loaded: LoadedCell) -> Proposal:
+    return Proposal(row={"cause": ""}, loaded=loaded)
 
 
 def _job(
@@ -74,13 +71,11 @@ def _job(
 ) -> Job:
     name = context.objectives[0]
     kept, causes = [*range(len(cells))], dict[int, str]()
+    job = Job(function=compute_proposal, context=context, tally=tally)
     for number, share in enumerate(RUNGS):
         if len(kept) < FEWEST:
             break
-        job = Job(function=compute_proposal, context=context, tally=tally)
-        units = [
-            Proposal(row={"cause": ""}, loaded=coarse(cells[k], share)) for k in kept
-        ]
+        units = [_as_it_is(coarse(cells[k], share)) for k in kept]
         found = stages.run(f"coarse_{number + 1}", job, units)
         out = poor(kept, found, base, name, requirements)
         causes |= out

@@ -19,8 +19,7 @@ from reachmap.maps.study.record import ALWAYS, OBJECTIVES, Study
 from reachmap.runtime.job import Job, Stages, Work
 from reachmap.runtime.options import IN_PROCESS, RunOptions
 from reachmap.runtime.run import run_scan
-from reachmap.scans.document import journal_settings
-from reachmap.studies.assembly import KIND, tally
+from reachmap.studies.assembly import tally, work_on_cells
 from reachmap.studies.design import (
     Factor,
     Variant,
@@ -354,14 +353,8 @@ def study_work(
         for loaded, key in zip(cells, keys, strict=True)
     ]
     firsts = [cells[keys.index(key)] for key in distinct]
-    return Work(
-        kind=KIND,
-        units=units,
-        job=partial(_job, firsts, objectives, places_bin),
-        settings=journal_settings(document)
-        | {"cells": [loaded.sha256 for loaded in cells]},
-        document=document,
-        frames=len(units),
+    return work_on_cells(
+        cells, units, partial(_job, firsts, objectives, places_bin), document
     )
 
 
