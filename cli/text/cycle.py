@@ -34,6 +34,7 @@ def cycle_lines(cycle: CycleSummary | None) -> list[str]:
                 ("least to most", f"{cycle.least:.2f} to {cycle.most:.2f} s"),
                 ("throughput", throughput_text(cycle.throughput)),
                 *([("put down at", cycle.put_down)] if cycle.put_down else []),
+                *([("lifts", cycle.lower_lifts)] if cycle.lower else []),
             ]
         )
     if cycle.ends:

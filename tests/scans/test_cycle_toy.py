@@ -233,6 +233,55 @@ def test_lifts_of_a_given_length(tmp_path):
     assert tcp(lift[-1])[1] - tcp(lift[0])[1] == pytest.approx(0.123, abs=1e-6)
 
 
+def roof(room_mm):
+    """A roof over the bin's middle that only the part can touch, as an override.
+
+    It leaves the part so much room above the rim, the safety margin counted.
+    """
+    under_m = 0.05 + DEPTH + LENGTH + MARGIN + room_mm / 1e3
+    return (
+        'bodies=[{"name":"roof","attach_to":"world","shape":{"box":[0.05,0.02,0.002]},'
+        f'"pose":{{"xyz":[0.35,-0.16,{under_m + 0.001}]}}}}]'
+    )
+
+
+@pytest.mark.parametrize(
+    ("room_mm", "above_rim_mm"),
+    [(10.1, 10.0), (9.9, 7.5), (7.4, 5.0), (2.6, 2.5), (2.4, None)],
+)
+def test_lifts_end_lower_where_something_is_above(room_mm, above_rim_mm):
+    """At the highest of the heights that leave the part its margin, or nowhere."""
+    found = lifted(roof(room_mm))
+    if above_rim_mm is None:
+        assert (found.status, found.blocking_pair) == (
+            StageStatus.LIFT_BLOCKED,
+            "roof | part",
+        )
+        return
+    assert found.status == StageStatus.PATH_FOUND
+    assert found.above_rim_m == pytest.approx(above_rim_mm / 1e3)
+    low, high = (tcp(q)[1] for q in (found.way[0], found.way[-1]))
+    rise = DEPTH + above_rim_mm / 1e3 - (0.04 - LENGTH)
+    assert high - low == pytest.approx(rise, abs=1e-6)
+
+
+def test_lower_lifts_are_kept_and_told(tmp_path, toy):
+    """The map holds how far above the rim each ends; `info` counts the lower ones."""
+    record = scan(tmp_path, roof(6.0), "drop_off=null", "bin_scan.grid=[3, 1]")
+    above_m = record.lift_above_rim.ravel()
+    np.testing.assert_allclose(above_m[1], 0.005)
+    told: Any = summarise_cycle(record)
+    assert told.lower_lifts == (
+        f"1 of {told.whole} lifts end lower than 10 mm above the rim, the lowest at "
+        "5.0 mm"
+    )
+    whole = np.isfinite(toy.cycle.cycle_time)
+    np.testing.assert_allclose(toy.lift_above_rim[whole], 0.01)
+    assert np.isnan(toy.lift_above_rim[~whole]).all()
+    told = summarise_cycle(toy)
+    assert told.lower_lifts == ""
+
+
 @pytest.mark.parametrize(
     ("overrides", "message"),
     [

@@ -111,6 +111,7 @@ def bin_with_parts(record: BinMap, seed: int = 1) -> BinMap:
             ),
         ),
         cycle=synthetic_cycle(record, whole, rng),
+        lift_above_rim=np.where(whole, 0.01, np.nan),
         T_world_base=T_WORLD_BASE,
     )
 

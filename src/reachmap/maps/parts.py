@@ -203,6 +203,10 @@ class Margins:
         freeze(self)
 
 
+ABOVE_RIM_M = 0.01
+"""How far above the rim a lift that is to clear it takes the part, if it can [m]."""
+
+
 class StageStatus(IntEnum):
     """Outcome of a stage of the cycle; the first six mean what they do elsewhere.
 

@@ -237,7 +237,7 @@ class BinMap(ShownBin):
     winning_roll : array, shape (nl, ny, nx, no), or None
         Roll of the best path, where roll is free [rad]; NaN without a path.
     T_world_base, components, effort, best, times, margins, cycle, part_corners,
-    refinement
+    lift_above_rim, refinement
         What maps hold since version 1.1; None where the file does not.
     """
 
@@ -282,6 +282,7 @@ class BinMap(ShownBin):
     margins: Margins | None = None
     cycle: Cycle | None = None
     part_corners: FloatArray | None = None
+    lift_above_rim: FloatArray | None = None
     refinement: Refinement | None = None
     T_world_base: FloatArray | None = None
 

@@ -56,6 +56,8 @@ def _words(cycle: CycleSummary) -> str:
     )
     if cycle.put_down:
         text += f" Whole cycles by where the part is put down: {cycle.put_down}."
+    if cycle.lower:
+        text += f" {cycle.lower_lifts}."
     made = cycle.throughput
     if made is None:
         return text

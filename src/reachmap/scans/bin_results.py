@@ -229,6 +229,7 @@ def assemble_bin_map(
         margins=_margins(shaped(results.margins)),
         cycle=cycle.section(document["stages"], known, shaped) if cycle else None,
         part_corners=_part_corners(document),
+        lift_above_rim=shaped(cycle.lift_above_rim) if cycle else None,
         path_reachability=percent,
         scan_configuration=np.array(document["scan_configuration"], float),
         joint_names=tuple(document["joint_names"]),

@@ -64,8 +64,8 @@ class LiftSpec(Record):
     )
     height: Height = Field(
         CLEAR_RIM,
-        description="Length of the lift [m]; clear_rim: until the whole part is above "
-        "the rim.",
+        description="Length of the lift [m]; clear_rim: until the whole part is 10 mm "
+        "above the rim, or 7.5, 5 or 2.5 mm where it is blocked before.",
     )
     contact_allowance_m: Depth = Field(
         0.002,

@@ -9,6 +9,7 @@ all others, the walls among them, from the first millimetre with the full margin
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -20,14 +21,15 @@ from reachmap.core.collision.bodies import BOTTOM, HEAP, SHELL
 from reachmap.core.collision.held_part import HeldPart
 from reachmap.core.planning.approach import StraightApproach
 from reachmap.geometry import axis_vector, inverse_transform
-from reachmap.maps.parts import StageStatus
+from reachmap.maps.parts import ABOVE_RIM_M, StageStatus
 from reachmap.maps.records import NO_PAIR
 
 if TYPE_CHECKING:
     from reachmap.core.scene import Scene
 
-# How far above the rim a lift that is to clear it takes the part [m].
-ABOVE_RIM_M = 0.01
+# Where a lift that is to clear the rim is blocked or out of reach, it ends lower [m],
+# at the first of these that is free.
+_LOWER_M = (0.0075, 0.005, 0.0025)
 # A direction flatter than this never clears the rim.
 _LEAST_RISE = math.cos(math.radians(75.0))
 _ROUNDING_M = 1e-9
@@ -44,11 +46,14 @@ class Lift:
         The two bodies in the way, "" where there are none.
     way : array, shape (n, dof)
         From the grasp to the end of the lift, verified; no rows without one.
+    above_rim_m : float
+        Height of the part's lowest point above the rim at the end [m]; NaN without one.
     """
 
     status: StageStatus
     blocking_pair: str
     way: FloatArray
+    above_rim_m: float = math.nan
 
 
 class Lifts:
@@ -83,13 +88,17 @@ class Lifts:
         checker = self._lifted.checker
         if not checker.is_free(q_grasp):
             return self._failed(StageStatus.PART_IN_COLLISION, q_grasp, self._lifted)
-        distance_m = self.distance_m(lowest_m, rise)
-        if distance_m is None:
-            return _without_way(StageStatus.LIFT_OUT_OF_REACH)
-        return self._way(T, q_grasp, direction, distance_m)
+        highest = _without_way(StageStatus.LIFT_OUT_OF_REACH)
+        for number, distance_m in enumerate(self.distances_m(lowest_m, rise)):
+            lift = self._way(T, q_grasp, direction, distance_m)
+            if lift.status == StageStatus.PATH_FOUND:
+                above_m = lowest_m + distance_m * rise - self._depth_m
+                return dataclasses.replace(lift, above_rim_m=above_m)
+            highest = highest if number else lift
+        return highest
 
-    def distance_m(self, lowest_m: float, rise: float) -> float | None:
-        """Length of a lift [m]; None where it cannot clear the rim.
+    def distances_m(self, lowest_m: float, rise: float) -> tuple[float, ...]:
+        """Lengths that a lift may have [m], longest first; none clears the rim.
 
         Parameters
         ----------
@@ -99,10 +108,14 @@ class Lifts:
             How much of the lift is along the bin's z.
         """
         if not isinstance(self._spec.height, str):
-            return self._spec.height
+            return (self._spec.height,)
         if rise < _LEAST_RISE:
-            return None
-        return max(0.0, (self._depth_m + ABOVE_RIM_M - lowest_m) / rise)
+            return ()
+        # Nearer to the rim than the safety margin no lift may end.
+        lower_m = (above_m for above_m in _LOWER_M if above_m > self._margin_m)
+        missing_m = self._depth_m - lowest_m
+        lengths = (max(0.0, (missing_m + a) / rise) for a in (ABOVE_RIM_M, *lower_m))
+        return tuple(dict.fromkeys(lengths))
 
     def _direction(self, T_base_tcp: FloatArray) -> FloatArray:
         if self._spec.direction == "vertical":

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from reachmap._typing import BoolArray
+from reachmap._typing import BoolArray, FloatArray
 from reachmap.maps.cycle.seconds import (
     TO_GRASP,
     Throughput,
@@ -17,10 +17,11 @@ from reachmap.maps.cycle.seconds import (
     failing_stage,
     throughput_of_bin,
 )
-from reachmap.maps.parts import StageStatus
+from reachmap.maps.parts import ABOVE_RIM_M, StageStatus
 from reachmap.maps.records import BinMap, Status
 
 SHOWN = {TO_GRASP: "way to the grasp"}
+_ROUNDING_M = 1e-6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -77,6 +78,10 @@ class CycleSummary:
     parts : tuple of PartSeconds
     ends : tuple of CycleEnd
         Most frequent first.
+    lower : int
+        Whole cycles whose lift ends less than 10 mm above the rim.
+    lowest_m : float
+        How far above the rim the lowest of these ends [m]; NaN without any.
     drop_offs : tuple of (str, int)
         Places where the part may go, as the cell names them, and whole cycles to each.
     throughput : Throughput or None
@@ -91,6 +96,8 @@ class CycleSummary:
     most: float
     parts: tuple[PartSeconds, ...]
     ends: tuple[CycleEnd, ...]
+    lower: int
+    lowest_m: float
     drop_offs: tuple[tuple[str, int], ...]
     throughput: Throughput | None
 
@@ -100,6 +107,17 @@ class CycleSummary:
         if len(self.drop_offs) < 2:
             return ""
         return ", ".join(f"{name} {count}" for name, count in self.drop_offs)
+
+    @property
+    def lower_lifts(self) -> str:
+        """How many lifts end lower than they might, "" where none does."""
+        if not self.lower:
+            return ""
+        return (
+            f"{self.lower} of {self.whole} lifts end lower than "
+            f"{1e3 * ABOVE_RIM_M:.0f} mm above the rim, the lowest at "
+            f"{1e3 * self.lowest_m:.1f} mm"
+        )
 
     @property
     def sentence(self) -> str:
@@ -123,6 +141,7 @@ def summarise_cycle(record: BinMap) -> CycleSummary | None:
     nan = float("nan")
     low, middle, high = np.quantile(known, (0, 0.5, 1)) if len(known) else (nan,) * 3
     attempted = int((record.status != Status.NOT_ATTEMPTED).sum())
+    lower = _lower_lifts(record)
     return CycleSummary(
         reached=int((record.status == Status.PATH_FOUND).sum()),
         whole=int(whole.sum()),
@@ -133,9 +152,19 @@ def summarise_cycle(record: BinMap) -> CycleSummary | None:
         most=float(high),
         parts=_parts(record),
         ends=_ends(record),
+        lower=len(lower),
+        lowest_m=float(lower.min()) if len(lower) else nan,
         drop_offs=_drop_offs(record, whole),
         throughput=throughput_of_bin(record),
     )
+
+
+def _lower_lifts(record: BinMap) -> FloatArray:
+    """How far above the rim those lifts end that do not rise as far as others [m]."""
+    if record.lift_above_rim is None:
+        return np.zeros(0)
+    above_m = record.lift_above_rim
+    return np.asarray(above_m[above_m < ABOVE_RIM_M - _ROUNDING_M])
 
 
 def _drop_offs(record: BinMap, whole: BoolArray) -> tuple[tuple[str, int], ...]:

@@ -252,6 +252,17 @@ def _check_cycle(tree: Tree) -> list[str]:
     ]
 
 
+def _check_lift(tree: Tree) -> list[str]:
+    times = tree.leaves.get("cycle/cycle_time")
+    if times is None:
+        return []
+    lifted = np.isfinite(tree.array("cycle/lift_above_rim"))
+    return require(
+        lifted == np.isfinite(times.value),
+        "cycle/lift_above_rim must be finite exactly where every stage has a path",
+    )
+
+
 def _check_stage(tree: Tree) -> list[str]:
     stage = tree.array("paths/stage")
     scale = tree.leaves.get("cycle/stage")
@@ -284,6 +295,7 @@ _CHECKS = {
     "approach_time": _check_times,
     "clearance": _check_margins,
     "cycle/stage_status": _check_cycle,
+    "cycle/lift_above_rim": _check_lift,
     "paths/stage": _check_stage,
     "refinement/status": _check_refinement,
 }

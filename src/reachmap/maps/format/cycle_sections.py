@@ -93,6 +93,21 @@ PART = Section(
     },
 )
 
+LIFT = Section(
+    field="lift_above_rim",
+    arrays={
+        "lift_above_rim": variable(
+            "cycle/lift_above_rim",
+            GRASP,
+            "f8",
+            "Height of the part's lowest point above the rim after the lift; NaN "
+            "unless every stage has a path.",
+            units="m",
+            nan=True,
+        )
+    },
+)
+
 STAGE_OF_PATH = Section(
     field="paths.stage",
     arrays={
@@ -106,4 +121,4 @@ STAGE_OF_PATH = Section(
     },
 )
 
-CYCLE_SECTIONS = (CYCLE, PART, STAGE_OF_PATH)
+CYCLE_SECTIONS = (CYCLE, PART, LIFT, STAGE_OF_PATH)

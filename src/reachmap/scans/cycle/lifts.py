@@ -42,11 +42,14 @@ class LiftSurvey:
         Index into the map's ``body_pairs``, -1 where there is none.
     ways : Ways
         From the grasp to the end of the lift; empty without one.
+    above_rim : array, shape (goals,)
+        Height of the part's lowest point above the rim at its end [m]; NaN without one.
     """
 
     status: CodeArray
     blocking_pair: IntArray
     ways: Ways
+    above_rim: FloatArray
 
     def __post_init__(self) -> None:
         freeze(self)
@@ -55,11 +58,18 @@ class LiftSurvey:
         """The same with other lifts, which take the places (m,) among the goals."""
         status, pair = self.status.copy(), self.blocking_pair.copy()
         status[place], pair[place] = others.status, others.blocking_pair
+        above_rim = self.above_rim.copy()
+        above_rim[place] = others.above_rim
         ways = [self.ways[k] for k in range(len(self.ways))]
         for k, at in enumerate(place.tolist()):
             ways[at] = others.ways[k]
         dof = self.ways.point.shape[1]
-        return LiftSurvey(status=status, blocking_pair=pair, ways=Ways.of(ways, dof))
+        return LiftSurvey(
+            status=status,
+            blocking_pair=pair,
+            ways=Ways.of(ways, dof),
+            above_rim=above_rim,
+        )
 
     def verdict(self, goals: IntArray) -> tuple[int, int]:
         """Status of a grasp none of whose goals has a lift, and the pair to blame."""
@@ -101,13 +111,18 @@ def lift_in_stages(
     status = np.zeros(len(survey.frame), np.uint8)
     pair = np.full(len(survey.frame), NO_PAIR, np.int64)
     size = np.zeros(len(survey.frame), np.int64)
+    above_rim = np.full(len(survey.frame), np.nan)
     found = Ways.join([payload["ways"] for payload in payloads], ends.shape[1])
     if len(rows):
         status[rows] = np.concatenate([payload["status"] for payload in payloads])
         pair[rows] = np.concatenate([p["blocking_pair"] for p in payloads])
         size[rows] = found.size
+        above_rim[rows] = np.concatenate([p["above_rim"] for p in payloads])
     return LiftSurvey(
-        status=status, blocking_pair=pair, ways=Ways(point=found.point, size=size)
+        status=status,
+        blocking_pair=pair,
+        ways=Ways(point=found.point, size=size),
+        above_rim=above_rim,
     )
 
 
@@ -133,4 +148,5 @@ def lift_unit(
             [number.get(lift.blocking_pair, NO_PAIR) for lift in made], np.int64
         ),
         "ways": dataclasses.asdict(ways),
+        "above_rim": np.array([lift.above_rim_m for lift in made]),
     }

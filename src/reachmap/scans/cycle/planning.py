@@ -72,6 +72,8 @@ class CyclePlan:
         Path of each stage and its planned way-points; none unless all have one.
     cycle_time_s : float
         Waits included; NaN unless every stage has a path.
+    above_rim_m : float
+        Of the part at the end of the lift; NaN unless every stage has a path.
     """
 
     status: CodeArray
@@ -82,6 +84,7 @@ class CyclePlan:
     way_in: WayIn | None
     paths: tuple[tuple[FloatArray, int], ...]
     cycle_time_s: float
+    above_rim_m: float = float("nan")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -280,6 +283,7 @@ class CyclePlanner:
             way_in=best.way_in,
             paths=tuple(paths),
             cycle_time_s=best.in_s + sum(times) + spec.waits_s + image_s,
+            above_rim_m=float(self._lifts.above_rim[best.way_in.goal]),
         )
 
     def _lift_of(self, goals: IntArray) -> tuple[float, float]:

@@ -13,6 +13,10 @@ from reachmap.maps.parts import Cycle, StageStatus, freeze
 from reachmap.maps.records import NO_PAIR
 from reachmap.scans.cycle.planning import CyclePlan
 
+_OF_THE_MAP = (
+    "status", "blocking_pair", "time", "length", "drop_off", "cycle_time",
+)  # fmt: skip
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class CycleResults:
@@ -23,6 +27,8 @@ class CycleResults:
     status, blocking_pair, time, length : array, shape (grasps, stages)
         As in :class:`~reachmap.maps.parts.Cycle`.
     drop_off, cycle_time : array, shape (grasps,)
+    lift_above_rim : array, shape (grasps,)
+        Height of the part's lowest point above the rim after the lift [m].
     """
 
     status: CodeArray
@@ -31,6 +37,7 @@ class CycleResults:
     length: FloatArray
     drop_off: IntArray
     cycle_time: FloatArray
+    lift_above_rim: FloatArray
 
     def __post_init__(self) -> None:
         freeze(self)
@@ -45,6 +52,7 @@ class CycleResults:
             length=np.array([plan.length_rad for plan in plans]),
             drop_off=np.array([plan.drop_off for plan in plans], np.int64),
             cycle_time=np.array([plan.cycle_time_s for plan in plans]),
+            lift_above_rim=np.array([plan.above_rim_m for plan in plans]),
         )
 
     @classmethod
@@ -57,6 +65,7 @@ class CycleResults:
             length=np.full((grasps, stages), np.nan),
             drop_off=np.full(grasps, -1, np.int64),
             cycle_time=np.full(grasps, np.nan),
+            lift_above_rim=np.full(grasps, np.nan),
         )
 
     @classmethod
@@ -87,6 +96,6 @@ class CycleResults:
             percent = 100.0 * (whole & attempted).sum(-1) / attempted.sum(-1)
         return Cycle(
             stages=tuple(stages),
-            **{name: shaped(getattr(self, name)) for name in type(self).__slots__},
+            **{name: shaped(getattr(self, name)) for name in _OF_THE_MAP},
             reachability=percent,
         )
