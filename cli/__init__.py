@@ -29,7 +29,7 @@ __all__ = ["group", "main"]
     expose_value=False,
     is_eager=True,
     callback=show_version,
-    help="Show the version and exit; with -v those of the engines, too.",
+    help="Show the version and exit; with -v, also those of the engines.",
 )
 def group() -> None:
     """Path-reachability maps for bin-picking cells.

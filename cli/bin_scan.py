@@ -36,13 +36,13 @@ log = logging.getLogger(__name__)
     "--attempts",
     type=click.Choice(["roadmap", "planner"]),
     default=None,
-    help="Paths that branch off a shared network of routes, or the cell's planner from "
-    "scratch each time, as in the paper; default: the cell's bin_scan.attempts.",
+    help="roadmap: paths that branch off one shared roadmap; planner: the cell's "
+    "planner from scratch each time, as in the paper. Default: bin_scan.attempts.",
 )
 @click.option(
     "--part",
     metavar="NAME",
-    help="Which of the cell's parts is picked; default: the cell's part, or the first "
+    help="Which of the cell's parts to pick; default: the cell's part, or the first "
     "of its parts.",
 )
 @scan_options
@@ -61,12 +61,12 @@ def command(
 ) -> None:
     """Plan to every test grasp inside the bin.
 
-    PLACEMENT is what place-bin wrote; by default placement.h5 in this folder. It
-    holds the cell with its bin and scan configuration, so nothing else is needed.
-    With --cell, or where there is no placement.h5, the bin stands where the cell has
-    it: the cell named, that of workspace.h5 in this folder, or the shipped UR5 cell.
-    Each test grasp gets several attempts and every one is kept. Ctrl-C loses
-    nothing: the same command goes on.
+    PLACEMENT is the output of place-bin, by default placement.h5 in this folder. It
+    holds the cell with its bin pose and scan configuration, so nothing else is needed.
+    With --cell, or without a placement.h5, the bin stays where the cell has it: the
+    given cell, the one stored in workspace.h5, or the shipped UR5 cell. Each test
+    grasp is attempted several times and every attempt is kept. After Ctrl-C the same
+    command resumes the scan.
 
     Example: reachmap bin-scan placement.h5 --set bin_scan.repeats=1
     """
@@ -114,7 +114,7 @@ def _found_here() -> tuple[Path | None, Path | None]:
     if placement.exists():
         return placement, None
     if workspace.exists():
-        log.warning("no placement.h5 here: the bin stands where workspace.h5 has it")
+        log.warning("no placement.h5 here: using the bin pose of workspace.h5")
         return None, workspace
-    log.warning("no placement.h5 here: the bin stands where %s has it", DEFAULT_CELL)
+    log.warning("no placement.h5 here: using the bin pose of %s", DEFAULT_CELL)
     return None, None

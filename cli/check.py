@@ -1,4 +1,4 @@
-"""``reachmap check``: load a cell and say what is in it."""
+"""``reachmap check``: load a cell and summarise it."""
 
 from __future__ import annotations
 
@@ -27,8 +27,9 @@ def command(
     """Check a cell: joints, bodies, limits, scan configuration.
 
     CELL is the name of a shipped cell or the path of a cell file. Nothing is planned.
-    With -v the collision pairs are listed. Exits with 2 if the cell is wrong or its
-    scan configuration cannot be taken; the joint or the two bodies are named.
+    With -v the collision pairs are listed. Exits with code 2 if the cell is invalid or
+    its scan configuration is out of limits or in collision; the joint or the two
+    bodies are named.
 
     Example: reachmap check my-cell.yaml --set bin.pose.xyz=[0.6,0,-0.1]
     """
@@ -55,8 +56,8 @@ def _lines(answer: CellCheck, *, verbose: bool) -> Iterator[str]:
     yield f"cell    {answer.name}  (sha256 {answer.sha256[:12]})"
     yield f"robot   {answer.robot}"
     tilt = answer.base_tilt_deg
-    leans = f", leans {tilt:g} deg off the world's vertical" if tilt else ""
-    yield f"base    {answer.base_frame}{leans}"
+    tilted = f", tilted {tilt:g} deg from the world's vertical" if tilt else ""
+    yield f"base    {answer.base_frame}{tilted}"
     yield f"tcp     on {answer.tcp_parent}, approach {answer.approach_axis}"
     yield f"        at the scan configuration ({point}) m, approaching ({direction})"
     yield f"ik      {answer.ik_method}, {exact}"
@@ -71,11 +72,11 @@ def _lines(answer: CellCheck, *, verbose: bool) -> Iterator[str]:
         touch = f", may touch {', '.join(row.touch)}" if row.touch else ""
         yield f"  {row.name:<{width}}  on {row.attach_to}: {row.shape}{touch}"
     yield ""
-    left_out = f"{len(answer.proved_pairs)} more can never meet"
+    left_out = f"{len(answer.proved_pairs)} more can never collide"
     yield f"collision pairs  {len(answer.pairs)} checked, {left_out}"
     if verbose:
         yield from (f"  {pair}" for pair in answer.pairs)
-        yield from (f"  {pair} (never meet)" for pair in answer.proved_pairs)
+        yield from (f"  {pair} (never collide)" for pair in answer.proved_pairs)
     yield (
         f"resolution  planning step {answer.planning_step_rad:g} rad, verification "
         f"{answer.verification_distance_m * 1e3:g} mm, margin "
@@ -85,11 +86,11 @@ def _lines(answer: CellCheck, *, verbose: bool) -> Iterator[str]:
     yield f"scans   {frames} test frames, {grasps} test grasps"
     if answer.below_rim_m > 0:
         yield (
-            f"approach  {answer.approach_m:g} m, begins up to {answer.below_rim_m:g} m "
-            "below the rim (bin_scan.approach_distance_m: clear_rim begins above it)"
+            f"approach  {answer.approach_m:g} m, starts up to {answer.below_rim_m:g} m "
+            "below the rim (bin_scan.approach_distance_m: clear_rim starts above it)"
         )
     else:
-        yield f"approach  {answer.approach_m:g} m, begins above the rim"
+        yield f"approach  {answer.approach_m:g} m, starts above the rim"
     yield from (f"warning: {warning}" for warning in answer.warnings)
     yield f"scan configuration  {'INVALID' if answer.problems else 'valid'}"
     yield from (f"  {problem}" for problem in answer.problems)

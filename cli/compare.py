@@ -26,8 +26,8 @@ from reachmap.cli.options import (
     type=click.Choice(["robot_base", "bin", "world"]),
     default="robot_base",
     show_default=True,
-    help="Where poses must agree; bin compares bins that stand in different places, "
-    "world cells whose robots do.",
+    help="Frame in which poses are matched; bin compares bins at different places, "
+    "world compares robots at different places.",
 )
 @click.option(
     "--tolerance",
@@ -35,7 +35,7 @@ from reachmap.cli.options import (
     default=(0.1, 0.1),
     show_default=True,
     metavar="MM DEG",
-    help="Poses closer than this are the same.",
+    help="Poses closer than this match.",
 )
 @click.option(
     "--fail-under",
@@ -66,11 +66,11 @@ def command(
 ) -> None:
     """Compare two maps of the same kind, frame by frame.
 
-    BEFORE and AFTER are two workspace maps or two bin maps, as of a cell before and
-    after its camera housing became slimmer. Test frames are matched by pose, never by
-    index. Says how reachability changed and whether that is more than chance, which
-    frames were gained and lost, why, on which squares, and what differs between the
-    two cells. With MORE maps, each is compared with BEFORE, and all are drawn.
+    BEFORE and AFTER are two workspace maps or two bin maps, for example of a cell
+    before and after its camera housing was made slimmer. Test frames are matched by
+    pose, not by index. The answer says how reachability changed and whether the change
+    is significant, which frames were gained and lost, why and where, and how the two
+    cells differ. With MORE maps, each is compared with BEFORE, and all are drawn.
 
     Example: reachmap compare bin.h5 slim/bin.h5 --fail-under -0.5
     """

@@ -13,7 +13,7 @@ DEFAULT_CELL = "ur5-eye-in-hand"
 def complete_cells(
     ctx: click.Context, parameter: click.Parameter, incomplete: str
 ) -> list[CompletionItem]:
-    """Names of shipped cells that begin so, else files."""
+    """Shipped cells whose names start with the incomplete word, or else files."""
     from reachmap.cell.loading import shipped_cells
 
     names = [name for name in shipped_cells() if name.startswith(incomplete)]

@@ -1,4 +1,4 @@
-"""``reachmap completion``: a script that teaches a shell to complete."""
+"""``reachmap completion``: completion scripts for bash, zsh and fish."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ GOES_ON = "    [[ ${COMPREPLY[0]} == *[.=] ]] && compopt -o nospace\n"
 @json_option
 @click.pass_context
 def command(ctx: click.Context, shell: str, as_json: bool) -> None:
-    """Print a script that teaches a shell to complete.
+    """Print a shell-completion script.
 
-    Commands, options, names of shipped cells and the keys of --set are completed then.
-    Needs bash 4.4, zsh or fish.
+    It completes commands, options, names of shipped cells and the keys of --set. Needs
+    bash 4.4, zsh or fish.
 
     \b
     Example:

@@ -1,4 +1,4 @@
-"""``reachmap empty``: pick heaps to the end, and say what stays."""
+"""``reachmap empty``: simulate picking heaps until nothing more can be reached."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ from reachmap.cli.quantities import PART
     "--part",
     type=PART,
     metavar="PART",
-    help="A box, 60x40x20mm, a cylinder, d30x80mm, or a mesh file in metres, of which "
-    "the box around them counts; default: the part of the cell.",
+    help="A box (60x40x20mm), a cylinder (d30x80mm) or a mesh file in metres; "
+    "cylinders and meshes count as their bounding boxes. Default: the cell's part.",
 )
 @click.option(
     "--fill",
@@ -34,7 +34,7 @@ from reachmap.cli.quantities import PART
     default=0.9,
     show_default=True,
     metavar="SHARE",
-    help="Share of the depth that the parts reach up to, on average.",
+    help="Mean height of the heap as a share of the bin's depth.",
 )
 @click.option(
     "--heaps",
@@ -42,21 +42,21 @@ from reachmap.cli.quantities import PART
     default=3,
     show_default=True,
     metavar="N",
-    help="Heaps, with seeds one after the other.",
+    help="Number of heaps, with consecutive seeds.",
 )
 @click.option(
     "--order",
     type=click.Choice(["highest", "rank"]),
     default="highest",
     show_default=True,
-    help="Of what lies free: the highest part first, or the one that costs least.",
+    help="Which uncovered part to pick next: the highest, or the one of least cost.",
 )
-@output_option(help="Also write every part with its place and fate (JSON).")
+@output_option(help="Also write the pose and the outcome of every part (JSON).")
 @click.option(
     "--picture",
     type=OUTPUT_PATH,
     metavar="PATH",
-    help="Draw what stays there, too (.png or .svg).",
+    help="Also draw the parts that remain (.png or .svg).",
 )
 @seed_option
 @overwrite_option
@@ -73,10 +73,10 @@ def command(
     overwrite: bool,
     as_json: bool,
 ) -> None:
-    """Fill a bin with parts and pick them to the end.
+    """Fill a bin with parts and simulate emptying it.
 
-    Parts fall at random places of the bin and come to rest on what lies there. Each is
-    grasped at the middle of its top, along its normal, once no other part covers it, if
+    Parts are dropped at random positions and come to rest on those below. A part that
+    no other covers is picked at the centre of its top face, along the face's normal, if
     BIN_MAP reaches more than half of the test grasps around that. Nothing is planned.
 
     Example: reachmap empty bin.h5 --part 60x40x20mm

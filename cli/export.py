@@ -28,10 +28,10 @@ FORMATS = ("csv", "json", "joint-trajectory", "moveit", "urscript", "krl", "rapi
     type=click.Choice(FORMATS),
     default="csv",
     show_default=True,
-    help="Way-points with times (csv, json), sampled trajectories for ROS "
+    help="Waypoints with times (csv, json), sampled trajectories for ROS "
     "(joint-trajectory, moveit), or a program for a controller.",
 )
-@options.output_option(help="File to write; without it, and with -, it is printed.")
+@options.output_option(help="File to write; without it, or with -, print to stdout.")
 @options.overwrite_option
 @options.json_option
 def command(
@@ -48,7 +48,7 @@ def command(
     MAP is a bin map, bin.h5 by default. Each motion is the best stored path from the
     scan configuration to a test grasp: straight joint motions that were verified, with
     exact stops at their ends, then the straight approach. Robot languages get joint
-    motions without blending, since a blend would leave what was verified.
+    motions without blending, since a blend would leave the verified path.
 
     \b
     Example:

@@ -4,12 +4,12 @@
 Code  Meaning
 ===== ==========================================================================
 0     done
-1     done, but a gate that was asked for did not hold (``--fail-under``)
+1     done, but a gate failed (``--fail-under``, ``--min-reachable``, …)
 2     wrong usage or wrong input, or the answer cannot be written
 3     unfinished; the same command resumes
 70    an internal error; ``--debug`` shows where
 130   interrupted
-141   the reader of stdout went away (``| head``)
+141   stdout was closed by its reader (``| head``)
 ===== ==========================================================================
 """
 
@@ -38,7 +38,7 @@ class PipeClosedError(Exception):
 
 @dataclass(slots=True, kw_only=True)
 class RunState:
-    """What ``-v``, ``-q`` and ``--debug`` said; the context object of the group."""
+    """Values of ``-v``, ``-q`` and ``--debug``; the context object of the group."""
 
     debug: bool = False
     verbosity: int = 0
@@ -90,16 +90,16 @@ def exit_code_of(run: Callable[[], Any], state: RunState) -> int:
 def _report(lines: Iterable[str], state: RunState) -> None:
     if state.debug:
         traceback.print_exc()
-    _complain(lines)
+    _print_errors(lines)
 
 
-def _complain(lines: Iterable[str]) -> None:
+def _print_errors(lines: Iterable[str]) -> None:
     for line in lines:
         click.echo(f"{program_name('red')} {line}", err=True)
 
 
 def _missing_lines(error: Exception) -> list[str]:
-    """What to say where a dependency is missing, as after an install for ranking."""
+    """Message for a missing dependency, as after a ranking-only installation."""
     name = error.name if isinstance(error, ModuleNotFoundError) else None
     if name is None or name.partition(".")[0] == "reachmap":
         return []
@@ -120,5 +120,5 @@ def _interrupted(error: BaseException) -> int:
     # click hides the interrupt, and what it says about resuming, behind an Abort.
     cause = error.__cause__ if isinstance(error, click.Abort) else error
     message = str(cause or "").strip() or "interrupted"
-    _complain(message.splitlines())
+    _print_errors(message.splitlines())
     return INTERRUPTED

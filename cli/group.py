@@ -70,26 +70,26 @@ COMMANDS: dict[str, Entry] = {
         },
     ),
     **_section(
-        "Look",
+        "Inspect",
         {
             "info": "Summarise an artefact or a journal.",
-            "view": "Look at a cell or an artefact in 3D, in the browser.",
-            "report": "Write a run as one self-contained page.",
+            "view": "Show a cell or an artefact in 3D in the browser.",
+            "report": "Write a report of a run as one self-contained page.",
             "compare": "Compare two maps of the same kind, frame by frame.",
-            "empty": "Fill a bin with parts and pick them to the end.",
-            "robust": "Say which grasps survive when bin, camera or tool are off.",
-            "validate": "Test a bin map against real planning to real grasps.",
+            "empty": "Fill a bin with parts and simulate emptying it.",
+            "robust": "Find which grasps survive errors of bin, camera and tool.",
+            "validate": "Test a bin map by planning to real grasps.",
         },
     ),
     **_section(
         "Design",
         {
-            "study": "Map variants of a cell, and say which change is more than noise.",
-            "place-robot": "Find where the arm should stand, for a bin that stays.",
+            "study": "Map variants of a cell; find which changes are significant.",
+            "place-robot": "Find where the robot should stand for a given bin.",
         },
     ),
     **_section(
-        "Line",
+        "Motions",
         {"export": "Write verified motions of a bin map for controllers."},
     ),
     **_section(
@@ -105,14 +105,12 @@ COMMANDS: dict[str, Entry] = {
     **_section(
         "Runs",
         {
-            "run": "Do the whole chain: scan, place the bin, scan it, rank, report.",
-            "verify": "Check a file for damage and against its contract.",
-            "merge": "Join the journals of shards into one artefact.",
+            "run": "Run the pipeline: scan, place the bin, scan it, rank, report.",
+            "verify": "Check files for damage and against their format.",
+            "merge": "Merge the journals of shards into one artefact.",
         },
     ),
-    **_section(
-        "Shell", {"completion": "Print a script that teaches a shell to complete."}
-    ),
+    **_section("Shell", {"completion": "Print a shell-completion script."}),
 }
 
 
@@ -130,12 +128,13 @@ def _require_folder() -> None:
         Path.cwd()
     except OSError:
         raise SettingsError(
-            "the current folder is gone, or may not be entered; change to another"
+            "the current folder no longer exists or cannot be entered; change to "
+            "another"
         ) from None
 
 
 @contextmanager
-def _pipe_told_apart() -> Iterator[None]:
+def _distinct_broken_pipe() -> Iterator[None]:
     try:
         yield
     except BrokenPipeError as error:
@@ -170,7 +169,7 @@ class PipelineGroup(click.Group):
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
-        """Find the command, or say which names come close."""
+        """Find the command, or suggest the closest name."""
         if args and not args[0].startswith("-") and args[0] not in self.table:
             names = self.list_commands(ctx)
             close = difflib.get_close_matches(args[0], names, n=1)
@@ -198,7 +197,7 @@ class PipelineGroup(click.Group):
         return names + click.Command.shell_complete(self, ctx, incomplete)
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Keep the words, in which eager options may look for others."""
+        """Keep the words, so that eager options can see those that follow."""
         ctx.meta[ARGUMENTS] = tuple(args)
         return super().parse_args(ctx, args)
 
@@ -206,12 +205,12 @@ class PipelineGroup(click.Group):
         self, info_name: str | None, args: list[str], *rest: Any, **extra: Any
     ) -> click.Context:
         """Parse the options of the group, ``--help`` among them."""
-        with _pipe_told_apart():
+        with _distinct_broken_pipe():
             return super().make_context(info_name, args, *rest, **extra)
 
     def invoke(self, ctx: click.Context) -> Any:
-        """Run the command; a closed pipe is told apart from a failure."""
-        with _pipe_told_apart():
+        """Run the command; a closed pipe is distinguished from a failure."""
+        with _distinct_broken_pipe():
             return super().invoke(ctx)
 
     def main(  # type: ignore[override]

@@ -18,8 +18,8 @@ from reachmap.cli.answers import say
 @click.option(
     "--quantity",
     type=click.Choice(["path", "ik", "ik-free", "difference", "all"]),
-    help="What to draw of a workspace map: path reachability (the default), an IK "
-    "solution, a collision-free one, or how much IK promises that no path keeps.",
+    help="What to draw of a workspace map: path reachability (the default), IK, "
+    "collision-free IK, or the difference between IK and path reachability.",
 )
 @click.option(
     "--level",
@@ -52,7 +52,7 @@ from reachmap.cli.answers import say
     help="The map to draw a placement on; by default workspace.h5 beside it.",
 )
 @click.option(
-    "--csv", "tables", is_flag=True, help="Write the numbers as CSV files, too."
+    "--csv", "tables", is_flag=True, help="Also write the numbers as CSV files."
 )
 @options.output_option("heatmaps", help="Folder for the pictures.")
 @options.overwrite_option
@@ -60,13 +60,13 @@ from reachmap.cli.answers import say
 def command(artefact: Path, as_json: bool, **settings: Any) -> None:
     """Draw a workspace map, one picture per level.
 
-    FILE is a workspace map, workspace.h5 by default; a bin map or a placement is drawn
-    as well. A workspace map gives a picture of every level, seen from above, and one
-    of all levels together, a bin map its reachability after one and after all
-    attempts, the saturation, the costs and the approach directions; both show why test
-    frames are not reached. A placement gives the bin on its level, the runner-up and
-    the places that were considered. A study gives its main effects and, for two
-    parameters, their grid. The names of the files are printed.
+    FILE is a workspace map (by default workspace.h5), a bin map, a placement or a
+    study. A workspace map gives a picture of every level, seen from above, and one of
+    all levels; a bin map gives its reachability after one and after all attempts, the
+    saturation, the costs and the approach directions. Both also show why test frames
+    are not reached. A placement gives the bin on its level, the runner-up and the
+    places considered; a study its main effects and, for two parameters, their grid.
+    The names of the files are printed.
 
     Example: reachmap heatmap workspace.h5 --quantity all -o heatmaps
     """

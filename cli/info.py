@@ -16,12 +16,12 @@ from reachmap.cli.options import INPUT_FILE, json_option
 def command(artefact: Path, as_json: bool) -> None:
     """Summarise an artefact or a journal.
 
-    A workspace map: reachability level by level with its counts, why frames are not
-    reached and which bodies are in the way, how many planning attempts it rests on. A
-    bin map: reachability after one attempt, two, … with intervals, causes, quadrants,
-    lengths and times. A placement: pose, score, margin, runner-up. A study: variants,
-    main effects, the best. All: the cell,
-    settings and run behind it. A journal is summed up as far as it goes.
+    A workspace map: reachability and counts by level, why frames are not reached and
+    which bodies are in the way, and the planning effort behind the verdicts. A bin map:
+    reachability after one attempt, two, … with intervals, causes, quadrants, lengths
+    and times. A placement: pose, score, margin, runner-up. A study: variants, main
+    effects, the best variant. Each with its cell, settings and run. A journal is
+    summarised as far as it has got.
 
     Example: reachmap info bin.h5
     """

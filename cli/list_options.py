@@ -34,7 +34,7 @@ def into_settings(function: Any) -> Any:
         if cost == "cycle":
             unused(
                 "weights", "likeness", "margins", "neighbours", "normalise",
-                because="--cost cycle is in seconds, and weighs nothing",
+                because="--cost cycle is in seconds and takes no weights",
             )  # fmt: skip
         else:
             unused("failure_cost_s", because="needs --cost cycle")
@@ -96,8 +96,8 @@ list_options = compose(
         ),
         multiple=True,
         metavar="NAME μ",
-        help="Weight of what the path leaves: clearance, joint_margin or singularity, "
-        "or of wind_up, how far it turns the last joint. Repeatable.",
+        help="Weight of a margin of the path: clearance, joint_margin, singularity, or "
+        "wind_up (how far the last joint turns). Repeatable.",
     ),
     click.option(
         "--normalise",
@@ -112,8 +112,8 @@ list_options = compose(
         type=click.Choice(["checks", "measured"]),
         default="checks",
         show_default=True,
-        help="Planning effort: state checks, the same in every run of a scan, or the "
-        "CPU time that was measured, as in the paper.",
+        help="Measure of planning effort: state checks, identical in every run of a "
+        "scan, or measured CPU time, as in the paper.",
     ),
     click.option(
         "--neighbours",
@@ -141,7 +141,7 @@ list_options = compose(
         "--from",
         "format_name",
         type=click.Choice(FORMATS),
-        help="Format of the lists; by default their content tells.",
+        help="Format of the lists; by default detected from their content.",
     ),
     click.option("--frame", metavar="NAME", help="Frame of imported lists."),
     into_settings,

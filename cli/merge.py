@@ -17,16 +17,16 @@ from reachmap.cli.options import (
 
 @click.command()
 @click.argument("shards", metavar="SHARD...", nargs=-1, required=True, type=INPUT_FILE)
-@output_option(required=True, help="Write the joined artefact here.")
+@output_option(required=True, help="Write the merged artefact here.")
 @overwrite_option
 @json_option
 def command(
     shards: tuple[Path, ...], output: Path, overwrite: bool, as_json: bool
 ) -> None:
-    """Join the journals of shards into one artefact.
+    """Merge the journals of shards into one artefact.
 
-    SHARD... are the journals that runs with --shard I/N left, all N of them, in any
-    order. They must come from the same cell, seed, settings and package versions.
+    SHARD... are the journals of all N runs with --shard I/N, in any order. They must
+    come from the same cell, seed, settings and package versions.
     The artefact has the same content hash as that of a single run; the journals are
     left as they are.
 

@@ -42,8 +42,8 @@ def _pairs(
     multiple=True,
     callback=_pairs,
     metavar="NAME=FOLDER",
-    help="Where package://NAME and $(find NAME) lead. Repeatable; needed only for "
-    "packages that do not lie around the URDF.",
+    help="Folder of package://NAME and $(find NAME). Repeatable; needed only for "
+    "packages that are not found around the URDF.",
 )
 @click.option(
     "--xacro-arg",
@@ -86,9 +86,9 @@ def command(
     URDF is the path of a .urdf or .xacro file, or package://NAME/PATH. Chain, joints,
     limits, a bin and a free scan configuration are filled in; what had to be guessed
     is marked GUESS. Packages and xacro arguments that are given here are written into
-    the cell. If links touch in every position, an SRDF that says so is written beside
-    the cell. Exits with 2 where the cell cannot work yet: one that cannot be loaded is
-    not written, one that can is written and what is to be mended is listed.
+    the cell. If links touch in every position, an SRDF that allows it is written beside
+    the cell. Exits with code 2 if the cell needs fixing: one that loads is written and
+    its problems are listed; one that does not load is not written.
 
     Example: reachmap new-cell ur.urdf.xacro name:=ur ur_type:=ur10e -o cell.yaml
     """
@@ -124,7 +124,7 @@ def command(
     )
     if made.problems:
         raise SceneError(
-            f"{made.path}: to be mended: {problem}" for problem in made.problems
+            f"{made.path}: to be fixed: {problem}" for problem in made.problems
         )
 
 
@@ -135,5 +135,5 @@ def _lines(made: NewCell) -> Iterator[str]:
     yield f"{made.path}: {count} {joints} from {made.base} to {made.tip}"
     if made.srdf_path is not None:
         yield f"{made.srdf_path}: links that touch in every position"
-    done = "mend what is listed" if made.problems else "edit the lines marked GUESS"
-    yield f"next: {done}, then reachmap check {made.path}"
+    step = "fix the problems listed" if made.problems else "edit the lines marked GUESS"
+    yield f"next: {step}, then reachmap check {made.path}"

@@ -106,7 +106,7 @@ bin_option = _option(
     "--bin",
     "bin_name",
     metavar="NAME",
-    help="Which of the cell's bins it is about (bins); default: its pick_from.",
+    help="Which of the cell's bins to use; default: its pick_from.",
 )
 
 
@@ -118,7 +118,7 @@ def with_bin(overrides: tuple[str, ...], name: str | None) -> tuple[str, ...]:
 keep_scan_option = _option(
     "--keep-scan-configuration",
     is_flag=True,
-    help="Leave the cell's own scan configuration.",
+    help="Keep the cell's own scan configuration.",
 )
 
 seed_option = _option(
@@ -135,7 +135,7 @@ workers_option = _option(
     metavar="N",
     default=available_cores,
     show_default="all cores",
-    help="Worker processes; 1 works in this process.",
+    help="Worker processes; 1 runs in this process.",
 )
 
 executor_option = _option(
@@ -150,20 +150,20 @@ shard_option = _option(
     "--shard",
     callback=parse_shard,
     metavar="I/N",
-    help="Do only the I-th of N shares of the work and leave a journal for "
+    help="Do only the I-th of N shares of the work and write a journal for "
     "reachmap merge.",
 )
 
 restart_option = _option(
     "--restart",
     is_flag=True,
-    help="Discard the journal of an earlier run and begin again.",
+    help="Discard the journal of an earlier run and start over.",
 )
 
 dry_run_option = _option(
     "--dry-run",
     is_flag=True,
-    help="Say what would be done, and how long it would take; write nothing.",
+    help="Report what would be done and how long it would take; write nothing.",
 )
 
 
@@ -176,8 +176,8 @@ progress_option = _option(
     "--progress/--no-progress",
     default=True,
     callback=_unless_quiet,
-    help="Report progress on stderr: a bar on a terminal, else a line now and then. "
-    "-q silences it, too.",
+    help="Show progress on stderr: a bar on a terminal, otherwise occasional lines. "
+    "-q also silences it.",
 )
 
 overwrite_option = _option(
@@ -188,7 +188,7 @@ json_option = _option(
     "--json",
     "as_json",
     is_flag=True,
-    help="Answer with exactly one JSON object on stdout.",
+    help="Print exactly one JSON object on stdout.",
 )
 
 
@@ -220,7 +220,7 @@ def output_option(
 
 
 def given(*names: str) -> list[str]:
-    """Those of some parameters that stand on the command line, as they are written."""
+    """Those of the named parameters that are on the command line, as spelled there."""
     ctx = click.get_current_context()
     return [
         parameter.opts[-1] if parameter.param_type_name == "option" else
@@ -232,19 +232,19 @@ def given(*names: str) -> list[str]:
 
 
 def unused(*names: str, because: str) -> None:
-    """Refuse options that stand on the command line and would change nothing.
+    """Refuse options on the command line that would have no effect.
 
     Parameters
     ----------
     *names : str
         Parameters of the command that is running.
     because : str
-        End of the sentence that the options begin, as in ``"needs --cell"``.
+        Rest of the sentence after the options, as in ``"needs --cell"``.
 
     Raises
     ------
     click.UsageError
-        One of them is there. Values from the environment are for many commands and
+        One of them is given. Values from the environment are for many commands and
         may go unused.
     """
     if found := given(*names):
@@ -263,7 +263,7 @@ def compose(*decorators: Decorator[Any]) -> Decorator[Any]:
 
 
 def into_run(function: Any) -> Any:
-    """Pass what says how a command computes as one ``run: RunOptions``."""
+    """Pass the options on how a command computes as one ``run: RunOptions``."""
 
     @functools.wraps(function)
     def command(**values: Any) -> Any:
@@ -302,8 +302,8 @@ scan_options = compose(
 
 
 def check_scan_options(run: RunOptions, *, dry_run: bool) -> None:
-    """Refuse options of a scan that would change nothing."""
+    """Refuse options of a scan that would have no effect."""
     if run.shard is not None:
-        unused("overwrite", because="a shard leaves a store, which --restart discards")
+        unused("overwrite", because="a shard writes a journal; --restart discards it")
     if dry_run:
         unused("overwrite", "restart", because="--dry-run writes nothing")

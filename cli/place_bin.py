@@ -92,8 +92,8 @@ region_options = compose(
     type=click.Choice(["search", "paper"]),
     default="search",
     show_default=True,
-    help="search looks for the best of all poses; paper takes the best level and the "
-    "100 % point in its densest patch.",
+    help="search optimises over all poses; paper takes the best level and the 100 % "
+    "point in its densest patch.",
 )
 @region_options
 @click.option(
@@ -102,22 +102,22 @@ region_options = compose(
     default=5,
     show_default=True,
     metavar="N",
-    help="Different places to map with the bin in the scene, and rows to print.",
+    help="Number of distinct places to map with the bin in the scene and to print.",
 )
 @click.option(
     "--tolerance",
     nargs=2,
     type=click.FloatRange(min=0),
     metavar="SHIFT TURN",
-    help="Choose for the worst case while the bin is off by this [m, deg]; 0 0 for the "
-    "pose itself. Default: the cell's placement.tolerance.",
+    help="Optimise the worst case while the bin is off by up to this [m, deg]; 0 0 for "
+    "the exact pose. Default: the cell's placement.tolerance.",
 )
 @keep_scan_option
 @click.option(
     "--picture",
     type=OUTPUT_PATH,
     metavar="PATH",
-    help="Draw the decision there, too: .png or .svg.",
+    help="Also draw the decision (.png or .svg).",
 )
 @bin_option
 @output_option("placement.h5")
@@ -144,21 +144,19 @@ def command(
 ) -> None:
     """Find where the bin should stand, and its scan configuration.
 
-    WORKSPACE is what workspace-scan wrote; by default workspace.h5 in this folder.
+    WORKSPACE is the output of workspace-scan, by default workspace.h5 in this folder.
     Poses are scored on the map; the best are mapped again with the bin in the scene.
     The result holds the cell with its new bin pose and scan configuration, so that
     bin-scan needs nothing else. The margin is how far the bin may be off before the
     score drops by 5 points.
 
-    Several bins are placed together, each beside the others, and each gets a file of
-    its own (placement-NAME.h5).
+    Several bins are placed together so that they do not overlap; each gets its own
+    file (placement-NAME.h5).
 
     Example: reachmap place-bin workspace.h5 --fix z=0 --region 0.2 0.8 -0.5 0.5
     """
     if bin_pose is not None:
-        unused(
-            "rule", "fixed", "region", "heights", because="--bin-pose is not searched"
-        )
+        unused("rule", "fixed", "region", "heights", because="not used with --bin-pose")
     from reachmap.cli.text.placement import placement_lines
     from reachmap.tools.place_bin import PlacementChoice, place_bin, placement_facts
     from reachmap.tools.place_bins import bin_names, place_bins

@@ -29,14 +29,14 @@ places_options = compose(
         "mountings",
         multiple=True,
         metavar="HOW",
-        help="floor, wall, ceiling, or how far the base leans [deg]; by default as the "
-        "cell has it. Repeatable: all are compared.",
+        help="Mounting: floor, wall, ceiling, or the tilt of the base [deg]; default: "
+        "as in the cell. Repeatable: all are compared.",
     ),
     click.option(
         "--rail",
         default="",
         metavar="JOINT",
-        help="Look for the position of this locked prismatic joint instead.",
+        help="Optimise the position of this locked prismatic joint instead.",
     ),
     click.option(
         "--rail-range",
@@ -71,14 +71,14 @@ places_options = compose(
         "--moves",
         multiple=True,
         metavar="BODY",
-        help="A body on the world that goes with the base, besides those that may "
-        "touch it. Repeatable.",
+        help="A body fixed to the world that moves with the base, besides those that "
+        "may touch it. Repeatable.",
     ),
     click.option(
         "--stays",
         multiple=True,
         metavar="BODY",
-        help="A body that may touch the base, and stays where it is. Repeatable.",
+        help="A body that may touch the base but stays where it is. Repeatable.",
     ),
 )
 
@@ -93,7 +93,7 @@ places_options = compose(
     type=INPUT_FILE,
     metavar="FRAGMENT",
     help="Another arm to compare: a YAML file with sections of a cell (robot, bodies, "
-    "scan_configuration, …) that take the place of the cell's. Repeatable.",
+    "scan_configuration, …) that replace those of CELL. Repeatable.",
 )
 @click.option(
     "--top",
@@ -101,14 +101,14 @@ places_options = compose(
     default=3,
     show_default=True,
     metavar="N",
-    help="Different places to plan paths from.",
+    help="Number of distinct places to plan paths from.",
 )
 @keep_scan_option
 @click.option(
     "--picture",
     type=OUTPUT_PATH,
     metavar="PATH",
-    help="Draw the places there, too: .png or .svg.",
+    help="Also draw the places (.png or .svg).",
 )
 @output_option("robot.h5")
 @set_option
@@ -134,12 +134,13 @@ def command(
     as_json: bool,
     run: RunOptions,
 ) -> None:
-    """Find where the arm should stand, for a bin that stays.
+    """Find where the robot should stand for a given bin.
 
     CELL is a shipped cell by name, or the path of a cell file. The bin and the bodies
-    on the world stay; what may touch the arm's base, as a pedestal does, goes with it.
-    Every place is judged by inverse kinematics and collision, paths are planned from
-    the best. The result holds the cell with its new base, for bin-scan.
+    fixed to the world stay; bodies that may touch the robot's base, such as a pedestal,
+    move with it. Every place is scored by inverse kinematics and collision checks;
+    paths are planned from the best. The result holds the cell with its new base pose,
+    ready for bin-scan.
 
     Example: reachmap place-robot ur5-eye-in-hand --heights -0.2 0.3 --picture robot.png
     """

@@ -27,7 +27,7 @@ class ErrorSizeType(click.ParamType):  # type: ignore[type-arg, unused-ignore]
     def convert(
         self, value: Any, param: click.Parameter | None, ctx: click.Context | None
     ) -> tuple[float, float]:
-        """Read one; click reports what is none."""
+        """Parse a value; click reports what is not one."""
         if isinstance(value, tuple):
             return value
         sizes: dict[str, float] = {}
@@ -53,7 +53,7 @@ ERROR_SIZE = ErrorSizeType()
 class PartType(click.ParamType):  # type: ignore[type-arg, unused-ignore]
     """A box ``60x40x20mm``, a cylinder ``d30x80mm`` or a mesh file.
 
-    Boxes, of a cylinder that around it, are read as three sides in metres.
+    A box is returned as three sides in metres, a cylinder as its bounding box.
     """
 
     name = "part"
@@ -61,7 +61,7 @@ class PartType(click.ParamType):  # type: ignore[type-arg, unused-ignore]
     def convert(
         self, value: Any, param: click.Parameter | None, ctx: click.Context | None
     ) -> tuple[float, float, float] | Path:
-        """Read one; click reports what is none."""
+        """Parse a value; click reports what is not one."""
         if isinstance(value, tuple | Path):
             return value
         text = str(value).strip()

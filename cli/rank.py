@@ -26,7 +26,7 @@ class ShareType(click.ParamType):  # type: ignore[type-arg, unused-ignore]
     def convert(
         self, value: Any, param: click.Parameter | None, ctx: click.Context | None
     ) -> tuple[float, bool]:
-        """Read one; click reports what is none."""
+        """Parse a value; click reports what is not one."""
         if isinstance(value, tuple):
             return value
         text = str(value).strip()
@@ -51,8 +51,8 @@ class ShareType(click.ParamType):  # type: ignore[type-arg, unused-ignore]
     help="The bin map to look costs up in.",
 )
 @options.output_option(
-    help="Write the ranked list here and print a table; a folder takes one file for "
-    "each list. Without it, and with -, the JSON is printed."
+    help="Write the ranked list here and print a table; a folder gets one file per "
+    "list. Without it, or with -, the JSON is printed."
 )
 @list_options
 @click.option(
@@ -60,7 +60,7 @@ class ShareType(click.ParamType):  # type: ignore[type-arg, unused-ignore]
     nargs=7,
     type=float,
     metavar="X Y Z QW QX QY QZ",
-    help="Pose in robot_base of the lists' frame, when the cell does not know it: a "
+    help="Pose of the lists' frame in robot_base, where the cell does not define it: a "
     "camera on the wrist, an object.",
 )
 @click.option(
@@ -73,8 +73,8 @@ class ShareType(click.ParamType):  # type: ignore[type-arg, unused-ignore]
     type=click.Choice(["raise", "mark"]),
     default="raise",
     show_default=True,
-    help="What becomes of grasps whose position or orientation is none (NaN, no "
-    "length, no rotation): the list is refused, or they come last as invalid.",
+    help="How to treat grasps without a valid position or orientation (NaN, zero "
+    "length, not a rotation): refuse the list, or rank them last as invalid.",
 )
 @options.cell_option
 @options.set_option
@@ -84,7 +84,7 @@ class ShareType(click.ParamType):  # type: ignore[type-arg, unused-ignore]
 @click.option(
     "--top", type=click.IntRange(min=1), metavar="N", help="Keep only the N best."
 )
-@click.option("--explain", metavar="ID", help="Tell the story of one grasp instead.")
+@click.option("--explain", metavar="ID", help="Explain the rank of one grasp instead.")
 @click.option(
     "--chart",
     type=options.OUTPUT_PATH,
@@ -200,7 +200,7 @@ def _check_gates(
 
 
 def _facts(answer: RankAnswer, *, to_stdout: bool) -> Any:
-    """What is asked for as one JSON value: a story, the lists, or what was written."""
+    """Answer as one JSON value: an explanation, the lists, or the files written."""
     if answer.explanation:
         return {"explanation": answer.explanation}
     if to_stdout:
@@ -220,7 +220,7 @@ def _facts(answer: RankAnswer, *, to_stdout: bool) -> Any:
 def _check_options(
     cell: str | None, output: Path | None, chart: Path | None, explain: str | None
 ) -> None:
-    """Refuse options that would change nothing."""
+    """Refuse options that would have no effect."""
     if cell is None:
         options.unused("overrides", "force", because="needs --cell")
     if chart is None:
@@ -228,4 +228,4 @@ def _check_options(
     if chart is None and (output is None or str(output) == "-"):
         options.unused("overwrite", because="needs --output or --chart")
     if explain is not None and output is None:
-        options.unused("top", because="--explain tells of one grasp")
+        options.unused("top", because="--explain is about one grasp")

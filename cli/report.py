@@ -16,13 +16,13 @@ from reachmap.cli.answers import say
 @options.overwrite_option
 @options.json_option
 def command(folder: Path, output: Path, overwrite: bool, as_json: bool) -> None:
-    """Write a run as one self-contained page.
+    """Write a report of a run as one self-contained page.
 
     FOLDER holds workspace.h5, placement.h5, bin.h5, ranked.json and validation.json,
     or some of them; the page says what is missing. It answers where the bin goes, how
     much of it is reached and which grasps come first, shows the cell and the maps,
-    names what stands in the way, and lists settings and provenance. Pictures are inside
-    the page, which asks for nothing from the network and prints well. Its name is
+    names the bodies in the way, and lists settings and provenance. Pictures are
+    embedded; the page loads nothing from the network and prints well. Its name is
     printed.
 
     Example: reachmap report run -o report.html

@@ -1,4 +1,4 @@
-"""``reachmap robust``: what stays reachable when bin, camera or tool are off."""
+"""``reachmap robust``: what stays reachable despite errors of bin, camera and tool."""
 
 from __future__ import annotations
 
@@ -36,33 +36,32 @@ def _size_option(name: str, help: str) -> Decorator[Any]:
 
 @click.command(cls=QuantityCommand)
 @click.argument("bin_map", metavar="BIN_MAP", type=INPUT_FILE)
-@_size_option("bin", "The bin stands elsewhere: 5mm, 1deg, or both as in 5mm 1deg.")
+@_size_option("bin", "Error of the bin's pose: 5mm, 1deg, or both as in 5mm 1deg.")
 @_size_option(
-    "camera",
-    "The camera is elsewhere than its calibration says, and with it what it sees.",
+    "camera", "Error of the camera's calibration, and so of the grasps it detects."
 )
-@_size_option("tool", "The tool is mounted askew.")
+@_size_option("tool", "Error of the tool's mounting.")
 @click.option(
     "--samples",
     type=int,
     default=24,
     show_default=True,
     metavar="N",
-    help="Perturbed cells at each multiple of the errors.",
+    help="Perturbed cells per multiple of the errors.",
 )
 @click.option(
     "--margin",
     type=ERROR_SIZE,
     default=NONE,
     metavar="LENGTH",
-    help="Clearance that must be left in a perturbed cell; default: nothing may touch.",
+    help="Clearance required in a perturbed cell; default: no contact.",
 )
 @output_option("robustness.h5")
 @click.option(
     "--picture",
     type=OUTPUT_PATH,
     metavar="PATH",
-    help="Draw the curve there, too (.png or .svg).",
+    help="Also draw the curve (.png or .svg).",
 )
 @seed_option
 @run_options
@@ -79,11 +78,11 @@ def command(
     as_json: bool,
     run: RunOptions,
 ) -> None:
-    """Say which grasps survive when bin, camera or tool are off.
+    """Find which grasps survive errors of bin, camera and tool.
 
-    The best path of each test grasp of BIN_MAP is run as it is stored. Where the
-    clearance on it covers what errors of that size can move, whatever their direction,
-    it is certified; elsewhere it is replayed in cells that are off by that much in
+    The best path of each test grasp of BIN_MAP is executed as stored. Where its
+    clearance exceeds any displacement that errors of this size can cause, it is
+    certified; elsewhere it is replayed in cells perturbed by errors of this size in
     random directions. The curve goes up to twice the errors.
 
     Example: reachmap robust bin.h5 --bin 5mm 1deg --tool 2mm

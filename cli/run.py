@@ -1,4 +1,4 @@
-"""``reachmap run``: the whole chain, into one folder."""
+"""``reachmap run``: the whole pipeline, into one folder."""
 
 from __future__ import annotations
 
@@ -34,12 +34,12 @@ def command(
     as_json: bool,
     run: RunOptions,
 ) -> None:
-    """Do the whole chain: scan, place the bin, scan it, rank, report.
+    """Run the pipeline: scan, place the bin, scan it, rank, report.
 
     CELL is a shipped cell by name or the path of a cell file. The folder gets
     workspace.h5, placement.h5, bin.h5, pictures, report.html and, with --grasps,
-    ranked.json. What is there already is kept if it was made from this cell; after
-    Ctrl-C the same command goes on where it was.
+    ranked.json. Existing files are kept if they were made from this cell; after Ctrl-C
+    the same command resumes.
 
     Example: reachmap run my-cell.yaml --grasps grasps.json -o run
     """

@@ -17,8 +17,8 @@ from reachmap.cli.options import json_option
 def command(name: Any, as_json: bool) -> None:
     """Print the JSON Schema of cells, grasp lists or ranked lists.
 
-    Editors that know JSON Schema complete keys and mark mistakes while one types; a
-    first line "# yaml-language-server: $schema=cell-1.schema.json" connects the two.
+    Editors that support JSON Schema complete keys and mark mistakes as you type; start
+    the file with "# yaml-language-server: $schema=cell-1.schema.json".
 
     Example: reachmap schema cell > cell-1.schema.json
     """

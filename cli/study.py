@@ -1,4 +1,4 @@
-"""``reachmap study``: which change of a cell helps most, and is it more than noise."""
+"""``reachmap study``: which change of a cell helps most, and is it significant."""
 
 from __future__ import annotations
 
@@ -45,8 +45,8 @@ OBJECTIVES = (
     multiple=True,
     required=True,
     metavar="NAME=VALUES",
-    help="What to vary: a parameter of the cell, or a key as --set takes it; "
-    "NAME=LOW:HIGH:N for N values at even distances, NAME=a,b,c for these. Repeatable.",
+    help="What to vary: a parameter of the cell, or a key as in --set; NAME=LOW:HIGH:N "
+    "for N evenly spaced values, NAME=a,b,c for a list. Repeatable.",
 )
 @click.option(
     "--latin-hypercube",
@@ -59,28 +59,28 @@ OBJECTIVES = (
     "--optimise",
     type=click.IntRange(min=2),
     metavar="N",
-    help="Let an optimiser propose N variants, of values, NAME=LOW:HIGH:N or "
-    "NAME=LOW:HIGH, each from what those before were worth.",
+    help="Let an optimiser propose N variants in turn, from values, NAME=LOW:HIGH:N or "
+    "NAME=LOW:HIGH, each based on the results so far.",
 )
 @click.option(
     "--halving",
     is_flag=True,
-    help="Map all variants on coarse grids first, and leave out, of the worse half, "
-    "what is surely below the best; rows say so.",
+    help="Map all variants on coarse grids first and drop those of the worse half that "
+    "are surely below the best; rows say so.",
 )
 @click.option(
     "--place/--keep-bin",
     default=False,
     show_default=True,
-    help="Place the bin anew for each variant, or keep it where the cell has it.",
+    help="Place the bin for each variant, or keep it where the cell has it.",
 )
 @click.option(
     "--objective",
     "objectives",
     type=click.Choice(OBJECTIVES),
     multiple=True,
-    help="What variants are judged by; the first says which is best. Repeatable; by "
-    "default the first five.",
+    help="Objectives to compute; the first decides which variant is best. Repeatable; "
+    "default: the first five.",
 )
 @click.option(
     "--require",
@@ -105,12 +105,12 @@ def command(
     run: RunOptions,
     **settings: Any,
 ) -> None:
-    """Map variants of a cell, and say which change is more than noise.
+    """Map variants of a cell; find which changes are significant.
 
     CELL is a shipped cell by name, or the path of a cell file. Each variant is mapped
     with the same seed and compared frame by frame with the variant that is closest to
-    the cell as it is. A variant that cannot work is a row with its cause. Ctrl-C loses
-    nothing: the same command goes on.
+    the cell as it is. A variant that fails is a row with its cause. After Ctrl-C the
+    same command resumes.
 
     Example: reachmap study ur5-eye-in-hand --vary tube_length=0.119,0.219,0.319
     """

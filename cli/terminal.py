@@ -1,7 +1,7 @@
-"""What a terminal shows besides the text itself: headings, verdicts, links.
+"""Styling of answers on a terminal: headings, verdicts, links.
 
-The text is the same to a letter. In pipes and files, on a dumb terminal, and where
-rich is not installed, it is all there is; NO_COLOR takes the colours away.
+The characters stay the same. In pipes and files, on a dumb terminal, and where rich is
+not installed, the text is plain; NO_COLOR removes the colours.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ def show(text: str) -> None:
 
 
 def program_name(colour: str | None = None) -> str:
-    """The first word of messages on stderr, in a colour where a terminal has them."""
+    """First word of messages on stderr, coloured where the terminal supports it."""
     name = "reachmap:"
     if colour is None or os.environ.get("NO_COLOR") or not is_terminal(sys.stderr):
         return name
@@ -40,7 +40,7 @@ def program_name(colour: str | None = None) -> str:
 
 
 def _show_styled(text: str) -> bool:
-    """Print with rich; whether it is installed."""
+    """Print with rich; return False where it is not installed."""
     try:
         # Imported here: pipes need none of it.
         from rich.console import Console
@@ -55,13 +55,13 @@ def _show_styled(text: str) -> bool:
     for match in PLACE.finditer(text):
         if address := _address(match.group()):
             shown.stylize(Style(link=address), *match.span())
-    # Not wrapped: the terminal does that, and what is copied is what was written.
+    # Not wrapped: the terminal does that, and copying then gets the original lines.
     Console(file=sys.stdout, highlight=False).print(shown, soft_wrap=True)
     return True
 
 
 def _address(word: str) -> str:
-    """Where a word leads: to a page, or a file that exists; else ""."""
+    """Link target of a word: a web page, or a file that exists; else ""."""
     if word.startswith("http"):
         return word.rstrip(".,;)")
     try:

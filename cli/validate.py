@@ -1,4 +1,4 @@
-"""``reachmap validate``: what a bin map predicts against real planning."""
+"""``reachmap validate``: predictions of a bin map against real planning."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     "--random",
     type=click.IntRange(min=1),
     metavar="N",
-    help="Draw N grasps uniformly between the test points and their approach "
-    "directions, as one more list.",
+    help="Add a list of N grasps drawn uniformly between the test points and their "
+    "approach directions.",
 )
 @click.option(
     "--repeats",
@@ -52,7 +52,7 @@ if TYPE_CHECKING:
     default=10,
     show_default=True,
     metavar="N",
-    help="How many of the first grasps of each order are compared.",
+    help="How many of the first grasps of each order to compare.",
 )
 @list_options
 @click.option(
@@ -64,8 +64,8 @@ if TYPE_CHECKING:
 @click.option(
     "--calibrate",
     is_flag=True,
-    help="Keep MAP.calibration.json beside the map, with which `rank` gives calibrated "
-    "probabilities.",
+    help="Write MAP.calibration.json beside the map, which makes the probabilities of "
+    "`rank` calibrated.",
 )
 @options.output_option(help="Write the results of every grasp here, as JSON.")
 @options.set_option
@@ -91,7 +91,7 @@ def command(
     basis: CostBasis,
     run: RunOptions,
 ) -> None:
-    """Test a bin map against real planning to real grasps.
+    """Test a bin map by planning to real grasps.
 
     Every grasp is ranked with MAP and then planned to in the map's own cell, bin
     included, as a picking loop would: to the recommended tool orientation first, then

@@ -16,7 +16,7 @@ LEVELS = (logging.ERROR, logging.WARNING, logging.INFO, logging.DEBUG)
 COLOURS = {logging.WARNING: "yellow", logging.ERROR: "red"}
 NORMAL = LEVELS.index(logging.WARNING)
 ARGUMENTS = "reachmap.arguments"
-"""Key of the words of the command line in the context: --version may stand first."""
+"""Context key of the command line's words: --version may precede -v."""
 ENGINES_WANTED = re.compile(r"-v+|--verbose")
 
 
@@ -29,12 +29,12 @@ class _StderrHandler(logging.StreamHandler):  # type: ignore[type-arg]
         super().emit(record)
 
     def format(self, record: logging.LogRecord) -> str:
-        """Begin with the name of the program, in the colour of the level."""
+        """Prefix the name of the program, in the colour of the level."""
         return f"{program_name(COLOURS.get(record.levelno))} {super().format(record)}"
 
 
 def configure_logging(verbosity: int) -> None:
-    """Send the package's log to stderr; 0 shows warnings, each step shows more."""
+    """Send the package's log to stderr; 0 shows warnings, higher values more."""
     logger = logging.getLogger("reachmap")
     logger.setLevel(LEVELS[min(max(NORMAL + verbosity, 0), len(LEVELS) - 1)])
     if not any(isinstance(handler, _StderrHandler) for handler in logger.handlers):
@@ -55,7 +55,7 @@ def _debug(ctx: click.Context, parameter: click.Parameter, value: bool) -> None:
 
 
 def show_version(ctx: click.Context, parameter: click.Parameter, value: bool) -> None:
-    """Print the version and end; with ``-v`` anywhere, of what it stands on, too."""
+    """Print the version and exit; with ``-v`` anywhere, also those of the engines."""
     if not value or ctx.resilient_parsing:
         return
     click.echo(f"reachmap {__version__}")
@@ -77,7 +77,7 @@ def verbosity_parameters() -> list[click.Parameter]:
             expose_value=False,
             is_eager=True,
             callback=_count,
-            help="Say more on stderr; -vv says most.",
+            help="Log more on stderr; -vv logs most.",
         ),
         click.Option(
             ["-q", "--quiet"],
@@ -85,7 +85,7 @@ def verbosity_parameters() -> list[click.Parameter]:
             expose_value=False,
             is_eager=True,
             callback=_count,
-            help="Say less on stderr.",
+            help="Log less on stderr.",
         ),
         click.Option(
             ["--debug"],

@@ -1,4 +1,4 @@
-"""``reachmap verify``: are files whole, and do they keep to their contract."""
+"""``reachmap verify``: are files intact, and do they follow their format."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from reachmap.cli.options import INPUT_FILE, json_option
 @click.argument("files", metavar="FILE...", type=INPUT_FILE, nargs=-1, required=True)
 @json_option
 def command(files: tuple[Path, ...], as_json: bool) -> None:
-    """Check a file for damage and against its contract.
+    """Check files for damage and against their format.
 
-    Reads every byte, compares every checksum, computes both hashes anew, and checks
-    names, dimensions, types, units, ranges, states and percentages against the format.
-    Whole files are named on stdout, each mistake is a line on stderr; the exit code is
-    2 if there is any. Journals of unfinished runs can be verified, too.
+    Reads every byte, compares every checksum, recomputes both hashes, and checks names,
+    dimensions, types, units, ranges, states and percentages against the format. Intact
+    files are listed on stdout, each defect is a line on stderr; the exit code is 2 if
+    there is any. Journals of unfinished runs can be verified as well.
 
     Example: reachmap verify workspace.h5 placement.h5 bin.h5
     """

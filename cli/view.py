@@ -34,7 +34,7 @@ def _test_grasp(
     "page",
     type=options.OUTPUT_PATH,
     metavar="PATH",
-    help="Write one page with playback that needs no server and no network, and end.",
+    help="Write one page with playback that needs no server and no network, and exit.",
 )
 @click.option(
     "--path",
@@ -50,15 +50,15 @@ def _test_grasp(
     type=click.IntRange(0, 65535),
     default=PORT,
     show_default=True,
-    help="Port of the live view; 0 takes a free one.",
+    help="Port of the live view; 0 picks a free one.",
 )
 @click.option(
     "--host",
     default=HOST,
     show_default=True,
     metavar="ADDRESS",
-    help="Address the live view listens on. Others than this machine's own, such as "
-    "0.0.0.0 in a container, let in whoever has the token in the printed address.",
+    help="Address the live view listens on. Any but a loopback address, such as "
+    "0.0.0.0 in a container, lets in whoever has the token in the printed address.",
 )
 @click.option(
     "--open/--no-browser",
@@ -78,22 +78,21 @@ def command(
     overwrite: bool,
     as_json: bool,
 ) -> None:
-    """Look at a cell or an artefact in 3D, in the browser.
+    """Show a cell or an artefact in 3D in the browser.
 
-    FILE is a workspace map, a placement or a bin map, or a cell. The cell is drawn with
-    the shapes that collisions are checked on, and the points of the map in the colours
-    of their reachability. A slider chooses the level, a filter the state of the test
-    frames. A click on a point puts the arm there; where it cannot be, the bodies in the
-    way are red. Paths of a bin map are played in the time the arm takes for them. The
-    view is served on this machine alone until Ctrl-C, to the page it serves and no
-    other. Needs the extra [view].
+    FILE is a workspace map, a placement, a bin map or a cell. The cell is drawn with
+    its collision shapes, and the points of the map are coloured by reachability. A
+    slider chooses the level, a filter the state of the test frames. Click a point to
+    put the arm there; bodies in collision turn red. Paths of a bin map play in their
+    execution time. The view is served on this machine only, to its own page, until
+    Ctrl-C. Needs the extra [view].
 
     Example: reachmap view bin.h5 --html bin-3d.html
     """
     if page is None:
         options.unused("overwrite", because="needs --html")
         if len(test_grasps) > 1:
-            raise click.UsageError("--path: the live view begins with one; see --html.")
+            raise click.UsageError("--path: the live view plays one; see --html.")
     else:
         options.unused("host", "port", "open_browser", because="--html has no server")
     from reachmap.tools.view import ViewOptions, view

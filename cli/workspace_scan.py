@@ -24,13 +24,13 @@ from reachmap.runtime.options import RunOptions
     type=click.Choice(["roadmap", "per-frame"]),
     default="roadmap",
     show_default=True,
-    help="roadmap joins all frames' configurations and plans to what is not "
-    "connected; per-frame plans to each frame from scratch, as the paper did.",
+    help="roadmap connects the configurations of all frames and plans to what stays "
+    "unconnected; per-frame plans to each frame from scratch, as in the paper.",
 )
 @click.option(
     "--with-bin",
     is_flag=True,
-    help="Leave the cell's bin in the scene; it is what is to be placed.",
+    help="Keep the cell's bin in the scene; by default it is yet to be placed.",
 )
 @output_option("workspace.h5")
 @scan_options

@@ -51,7 +51,7 @@ def bin_lines(summary: BinSummary) -> list[str]:
         "Attempts that found a path",
         *_measure_lines(summary.measures),
         "",
-        "What J is made of: share of the variance that is the grasp and not luck",
+        "Terms of J: share of the variance between grasps, as opposed to chance",
         *reliability_lines(summary.reliability),
         "",
         "Quadrants of the bin (N is +y, E is +x)",
@@ -72,7 +72,7 @@ def share_lines(shares: ReachedShares) -> list[str]:
 
 
 def _clearance_lines(shares: Sequence[ClearanceShare]) -> list[str]:
-    """What is left of the headline where paths must keep a distance."""
+    """Reachability where paths must keep a clearance."""
     if not shares:
         return []
     rows = [
@@ -120,13 +120,13 @@ def _unreached_lines(evidence: EvidenceSummary | None) -> list[str]:
 
 
 def reliability_lines(reliability: Mapping[str, Reliability]) -> list[str]:
-    """Share of each measure, with a warning where most of it is luck."""
+    """Share of each measure, with a warning where most of it is chance."""
     rows = []
     for name, found in reliability.items():
         if found.share != found.share:
-            said = "not known: no test grasp was reached twice, or all are alike"
+            said = "unknown: no test grasp was reached twice, or all are equal"
         else:
-            noise = "; mostly luck: it says little of a grasp" if found.is_noise else ""
+            noise = "; mostly chance, not the grasp" if found.is_noise else ""
             said = f"{found.share:.2f} over {plural(found.repeated, 'grasp')}{noise}"
         rows.append((MEASURES[name].words, said))
     return fact_lines(rows)

@@ -26,7 +26,7 @@ def compare_text(comparison: MapComparison) -> str:
         verdict(comparison.names, r),
         *fact_lines(_count_facts(r)),
         *_cause_lines("Why frames were lost", r.losses),
-        *_cause_lines("What kept the frames that were gained", r.gains),
+        *_cause_lines("Why gained frames were not reached before", r.gains),
         *_square_lines(r.squares),
         *_cell_lines(r.cell_changes),
     ]
@@ -49,13 +49,13 @@ def compare_many_text(comparisons: MapComparisons) -> str:
                 f"{r.change:+.2f}",
                 str(r.gained),
                 str(r.lost),
-                "" if named else "not beyond chance",
+                "" if named else "not significant",
             ]
         )
     lines = [
         *table_lines(rows, "<>>>>>><"),
-        "paired test by places, false-discovery rate 5 % over all; two maps also give "
-        "causes and squares",
+        "paired test by place, false-discovery rate 5 % over all; comparing two maps "
+        "also gives causes and squares",
     ]
     for item in comparisons.each:
         lines += ["", item.names[1], *_cell_lines(item.result.cell_changes)[1:]]
@@ -63,15 +63,15 @@ def compare_many_text(comparisons: MapComparisons) -> str:
 
 
 def verdict(names: tuple[str, str], r: Comparison) -> str:
-    """Answer the question in a sentence: which map reaches more, and is it chance."""
+    """Say in a sentence which map reaches more, and whether that is significant."""
     before, after = names
     counts = f"{plural(r.gained, 'test frame')} gained, {r.lost} lost"
     if not r.gained and not r.lost:
         return f"{after} reaches the same test frames as {before}."
     if r.p_value >= SIGNIFICANT:
-        return f"No difference beyond chance: {counts}."
+        return f"No significant difference: {counts}."
     word = "more" if r.gained > r.lost else "less"
-    return f"{after} reaches {word} than {before}, beyond chance: {counts}."
+    return f"{after} reaches significantly {word} than {before}: {counts}."
 
 
 def _count_facts(r: Comparison) -> list[tuple[str, str]]:
@@ -82,7 +82,7 @@ def _count_facts(r: Comparison) -> list[tuple[str, str]]:
             f"{poses}, by pose in {r.frame} within {1000 * r.tolerance_m:g} mm and "
             f"{r.tolerance_deg:g} deg",
         ),
-        ("gained, lost", f"{r.gained}, {r.lost} ({p_text(r.p_value)} by places)"),
+        ("gained, lost", f"{r.gained}, {r.lost} ({p_text(r.p_value)} by place)"),
         (
             "change",
             f"{r.change:+.2f} points ({r.change_low:+.2f} … {r.change_high:+.2f})",
@@ -121,7 +121,7 @@ def _square_lines(squares: SquareChange) -> list[str]:
     change = squares.percent("after") - squares.percent("before")
     places = np.argwhere(squares.significant)
     total = int((squares.frames > 0).sum())
-    named = f"{plural(len(places), 'square')} of {total} changed by more than chance"
+    named = f"{plural(len(places), 'square')} of {total} changed significantly"
     lines = ["", f"{named} (Fisher, false-discovery rate 5 %)"]
     if not len(places):
         return lines

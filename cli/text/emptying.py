@@ -1,4 +1,4 @@
-"""Heaps picked to the end, as people read them."""
+"""Simulated emptying of heaps as text."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ def emptying_lines(answer: EmptyAnswer) -> list[str]:
         f"{100 * answer.fill:g} %, {answer.order} first: {picked} of "
         f"{plural(parts, 'part')} picked"
     )
-    stays = "nothing stays"
+    remain = "nothing remains"
     if picked < parts:
         outside = answer.total("outside_map")
         unknown = f" ({outside} of them outside the map)" if outside else ""
-        stays = (
-            f"{answer.left_percent:.1f} % stay: {answer.total('unreachable')} are not "
-            f"reached{unknown}, {answer.total('covered')} lie below those"
+        remain = (
+            f"{answer.left_percent:.1f} % remain: {answer.total('unreachable')} are "
+            f"not reached{unknown}, {answer.total('covered')} lie below those"
         )
     rows = [["seed", "parts", "picked", "not reached", "below", "left %", "up to [mm]",
              "where"]]  # fmt: skip
@@ -33,4 +33,4 @@ def emptying_lines(answer: EmptyAnswer) -> list[str]:
         rows.append(
             [*map(str, counts), f"{s.left_percent:.1f}", height, s.where or "-"]
         )
-    return [head, stays, "", *table_lines(rows, ">>>>>>><")]
+    return [head, remain, "", *table_lines(rows, ">>>>>>><")]

@@ -67,7 +67,7 @@ def _headline(info: ArtefactInfo) -> str:
 
 
 def _approximation_lines(info: ArtefactInfo) -> list[str]:
-    """What "no IK solution" rests on, where that proves nothing."""
+    """Caveat on "no IK solution" where that is not a proof."""
     text = ik_approximation(info.record.provenance.settings)
     if not text:
         return []
@@ -156,7 +156,7 @@ def _placement_lines(summary: PlacementSummary) -> list[str]:
 
 
 def _tolerance_facts(summary: PlacementSummary) -> list[tuple[str, str]]:
-    """What the chosen pose keeps when the bin is off, and what it stands on."""
+    """Worst case of the chosen pose within the tolerance, and its support."""
     facts = []
     if summary.tolerance_shift_m is not None and summary.worst_score is not None:
         shift, turn = 1e3 * summary.tolerance_shift_m, summary.tolerance_turn_deg

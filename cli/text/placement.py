@@ -1,4 +1,4 @@
-"""What ``place-bin`` decided, in words."""
+"""The decision of ``place-bin`` as text."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def placement_lines(placement: BinPlacement, output: Path, top: int) -> Iterator
 
 
 def _stand(facts: dict[str, Any]) -> Iterator[str]:
-    """What the bin stands on, and what the worst case is."""
+    """Support of the bin, and the tolerance of the worst case."""
     if facts["support"] is not None:
         stands = facts["support"]
         yield (
@@ -58,7 +58,7 @@ def _stand(facts: dict[str, Any]) -> Iterator[str]:
 
 
 def _limit(facts: dict[str, Any]) -> Iterator[str]:
-    """What the tool itself loses, and which dimension would move that."""
+    """Limit set by the tool itself, and the dimensions that would raise it."""
     body = facts["tool_limit_body"] or "the tool"
     yield (
         f"no pose can score more than {facts['tool_limit_percent']:.1f}%: the tool "

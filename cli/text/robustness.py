@@ -1,4 +1,4 @@
-"""What errors of a cell cost, as people read it."""
+"""Robustness against errors of a cell as text."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from reachmap.text import percent_text, plural
 def robustness_lines(summary: RobustnessSummary) -> list[str]:
     """Headline, the curve as a table, and the bodies that come closest."""
     given = summary.given
-    rows = [["errors", "certified %", "in every cell %", "mean %", "least %", "most %"]]
+    rows = [["errors", "certified %", "in every cell %", "mean %", "min %", "max %"]]
     for step in summary.steps:
         values = (
             step.certified,
@@ -22,15 +22,15 @@ def robustness_lines(summary: RobustnessSummary) -> list[str]:
         )
         rows.append([f"x {step.scale:g}", *(percent_text(value) for value in values)])
     left = 1e3 * summary.margin_m
-    kept = f"{left:g} mm must be left" if left else "nothing may touch"
+    kept = f"{left:g} mm of clearance required" if left else "no contact allowed"
     lines = [
         f"{error_words(summary.errors)} off: {percent_text(given.reachability)} % of "
         f"{plural(summary.grasps, 'test grasp')} stay reachable on average, "
         f"{percent_text(given.certified)} % for certain "
         f"(without errors {percent_text(summary.steps[0].reachability)} %)",
         f"certified by the map's clearance: {summary.by_clearance}, by that of the "
-        f"bodies that move: {summary.by_pairs}; the rest replayed in "
-        f"{plural(summary.samples, 'cell')} a row; {kept}",
+        f"displaced bodies: {summary.by_pairs}; the rest replayed in "
+        f"{plural(summary.samples, 'cell')} per row; {kept}",
         "",
         *table_lines(rows, ">" * len(rows[0])),
     ]
@@ -38,7 +38,7 @@ def robustness_lines(summary: RobustnessSummary) -> list[str]:
         shown = [(str(n), pair) for pair, n in summary.closest[:PAIRS_SHOWN]]
         lines += [
             "",
-            "Bodies that come closest where nothing is certain",
+            "Closest bodies where nothing is certified",
             *table_lines(shown, "><"),
         ]
     return lines

@@ -97,7 +97,7 @@ def _effect_lines(summary: StudySummary) -> list[str]:
         return []
     return [
         "",
-        f"Main effects on {name}: means over all else",
+        f"Main effects on {name}: means over all other parameters",
         *table_lines(rows, "<>>"),
     ]
 

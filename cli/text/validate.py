@@ -34,7 +34,7 @@ def validation_text(validation: Validation) -> str:
             "",
             *_diagram_lines(validation.diagram),
             "",
-            "What J is made of: share of the variance of an attempt that is the grasp",
+            "Terms of J: share of an attempt's variance between grasps",
             *reliability_lines(validation.reliability),
             "",
             "By list",
@@ -165,7 +165,7 @@ def _figures_row(figures: OrderFigures) -> list[str]:
 
 
 def _cycle_lines(validation: Validation) -> list[str]:
-    """Whole cycles planned anew beside those of the map."""
+    """Re-planned whole cycles beside those of the map."""
     if not validation.cycles:
         return []
     overall = validation.cycles[-1]
@@ -180,7 +180,7 @@ def _cycle_lines(validation: Validation) -> list[str]:
             label = ""
     return [
         "",
-        "Whole cycles planned anew, with the part",
+        "Whole cycles re-planned with the part",
         *fact_lines(
             [
                 ("precision", _share_text(c.precision)),
@@ -192,8 +192,8 @@ def _cycle_lines(validation: Validation) -> list[str]:
                 ),
             ]
         ),
-        f"First {validation.top} of each order: mean measured cycle of those whole; "
-        "per part with what failures cost",
+        f"First {validation.top} of each order: mean measured time of whole cycles; "
+        "per part including the cost of failures",
         *table_lines(rows, "<<>>>"),
     ]
 

@@ -524,13 +524,13 @@ def test_four_axes_pick_at_the_roll_they_have(tmp_path: Path) -> None:
         np.testing.assert_allclose(met, turned, atol=1e-5)
 
 
-def test_what_cannot_work_yet_is_written_to_be_mended(tmp_path: Path) -> None:
+def test_a_cell_that_needs_fixing_is_written(tmp_path: Path) -> None:
     """Exit code 2 and a list on stderr; the answer names the file."""
     inside = arm().replace('lower="-2.9" upper="2.9"', 'lower="0" upper="0"', 1)
     path = urdf(tmp_path / "arm.urdf", inside)
     output = tmp_path / "cell.yaml"
     result = new_cell(path, "--json", output=output, code=2)
-    assert "cell.yaml: to be mended: robot.limits: joint 'j1' has no" in result.stderr
+    assert "cell.yaml: to be fixed: robot.limits: joint 'j1' has no" in result.stderr
     assert json.loads(result.stdout)["problems"]
     assert output.exists()
 

@@ -40,7 +40,7 @@ def run(
         ("reachmap --help | true; exit ${PIPESTATUS[0]}", 141, b""),
         ("reachmap cells | true; exit ${PIPESTATUS[0]}", 141, b""),
         ("mkdir gone; cd gone; rmdir ../gone; reachmap check planar-toy", 2,
-         b"the current folder is gone"),
+         b"the current folder no longer exists"),
     ],
 )  # fmt: skip
 def test_streams_that_are_closed_or_full(

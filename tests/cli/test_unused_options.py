@@ -1,4 +1,4 @@
-"""Options that would change nothing are refused, and dry runs heed all others."""
+"""Options that would have no effect are refused; dry runs obey all others."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def run(command: str, **how: object) -> Result:
         ("rank g.json --chart-top 3", "--chart-top: needs --chart."),
         ("rank g.json --overwrite", "--overwrite: needs --output or --chart."),
         ("rank g.json -o - --overwrite", "--overwrite: needs --output or --chart."),
-        ("rank g.json --explain a --top 3", "--top: --explain tells of one grasp."),
+        ("rank g.json --explain a --top 3", "--top: --explain is about one grasp."),
         ("validate bin.h5 --random 3 --frame bin", "--frame: needs GRASPS."),
         ("validate bin.h5 --random 3 --from suction", "--from: needs GRASPS."),
         ("validate bin.h5 g.json --overwrite", "--overwrite: needs --output, --ch"),
@@ -34,12 +34,12 @@ def run(command: str, **how: object) -> Result:
         ("view a.h5 --html b.html --no-browser", "--html has no server."),
         ("view a.h5 --html b.html --host 0.0.0.0", "--host: --html has no server."),
         ("view a.h5 --overwrite", "--overwrite: needs --html."),
-        ("view a.h5 --path 0,0,0,0 --path 0,0,0,1", "the live view begins with one"),
-        ("place-bin a.h5 --bin-pose 0 0 0 0 --fix z=0", "--fix: --bin-pose is not"),
-        ("place-bin a.h5 --bin-pose 0 0 0 0 --rule paper", "--rule: --bin-pose is n"),
+        ("view a.h5 --path 0,0,0,0 --path 0,0,0,1", "the live view plays one"),
+        ("place-bin a.h5 --bin-pose 0 0 0 0 --fix z=0", "--fix: not used with --bin-pose"),
+        ("place-bin a.h5 --bin-pose 0 0 0 0 --rule paper", "--rule: not used with --"),
         ("bin-scan a.h5 --cell b.yaml", "--cell: PLACEMENT holds the cell"),
         ("bin-scan --dry-run --restart", "--restart: --dry-run writes nothing."),
-        ("bin-scan --shard 1/2 --overwrite", "--overwrite: a shard leaves a store"),
+        ("bin-scan --shard 1/2 --overwrite", "--overwrite: a shard writes a journal"),
         ("workspace-scan --dry-run --overwrite", "--overwrite: --dry-run writes noth"),
         ("workspace-scan --executor dask:tcp://a:1 -j 2", "-j: the workers are those"),
         ("place-bin --executor dask:tcp://a:1 -j 2", "--workers: the workers are tho"),

@@ -174,9 +174,9 @@ def test_compare_says_what_changed(folder: Path) -> None:
     text = answer.stdout
     assert "path reachability 50.00 % to 62.50 % (+12.50 points)" in text
     assert "160 of 160 and 160 test frames, by pose in robot_base" in text
-    assert "gained, lost  20, 0 (p < 0.0001 by places)" in text
-    assert "What kept the frames that were gained" in text
-    assert "0 squares of 40 changed by more than chance" in text
+    assert "gained, lost  20, 0 (p < 0.0001 by place)" in text
+    assert "Why gained frames were not reached before" in text
+    assert "0 squares of 40 changed significantly" in text
     assert "The cells are the same" in text
     back = run("compare", folder / "better.h5", folder / "workspace.h5").stdout
     assert "(-12.50 points)" in back

@@ -12,7 +12,7 @@ def test_bin_scan_takes_the_cell_of_the_workspace_map(tmp_path):
     assert reachmap(tmp_path, "workspace-scan", "planar-toy").returncode == 0
     result = reachmap(tmp_path, "bin-scan")
     assert result.returncode == 0, result.stderr
-    assert "where workspace.h5 has it" in result.stderr
+    assert "using the bin pose of workspace.h5" in result.stderr
     info = reachmap(tmp_path, "info", "bin.h5", "--json")
     assert "planar-toy" in info.stdout
     grasps = {

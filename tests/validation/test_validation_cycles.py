@@ -1,4 +1,4 @@
-"""Whole cycles planned anew on the planar toy, whose truth is a closed form."""
+"""Whole cycles re-planned on the planar toy, whose truth is a closed form."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ def test_cycles_stand_in_the_text_and_the_facts(toy: tuple[Any, Any]) -> None:
     """Precision, recall and seconds of each order; J is judged as before."""
     _, answer = toy
     text = validation_text(answer.validation)
-    assert "Whole cycles planned anew, with the part" in text
+    assert "Whole cycles re-planned with the part" in text
     assert "by seconds" in text
     (facts,) = answer.facts["cycles"]
     assert set(facts["orders"]) == {"supplied", "re-ranked", "by seconds"}

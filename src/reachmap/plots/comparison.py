@@ -233,7 +233,7 @@ def _put_legend(figure: Figure, maps: MapChange, level: int | None) -> None:
             markersize=9,
             markeredgewidth=1.6,
             linestyle="none",
-            label="more than chance",
+            label="significant",
         )
         handles.append(mark)
     if level is not None:
