@@ -321,7 +321,7 @@ def test_meshes_are_hashed_and_their_sizes_questioned(tmp_path: Path) -> None:
         read_cell(write(tmp_path, scaled, '<mesh filename="arm.stl"/>')).warnings == ()
     )
     (tmp_path / "arm.stl").write_bytes(triangle_stl(1.0)[:-1])
-    with pytest.raises(CellError, match=r"robot\.urdf: mesh .*cut short"):
+    with pytest.raises(CellError, match=r"robot\.urdf: mesh .*truncated"):
         read_cell(path)
 
 

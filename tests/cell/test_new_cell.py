@@ -355,7 +355,7 @@ def test_a_scene_cut_short_is_refused(text: str, tmp_path: Path) -> None:
     made = new_cell(
         path, "--moveit-config", config, output=tmp_path / "cell.yaml", code=2
     )
-    assert "table.scene: not a MoveIt scene, or cut short" in made.stderr
+    assert "table.scene: not a MoveIt scene, or truncated" in made.stderr
 
 
 @pytest.mark.parametrize(
@@ -476,8 +476,7 @@ def test_a_tool_point_stays_where_its_maker_has_it(tmp_path: Path) -> None:
     made = new_cell(path, output=tmp_path / "cell.yaml")
     assert "hand_tcp, xyz: [0, 0, 0]" in (tmp_path / "cell.yaml").read_text()
     assert (
-        "no grasp in the bin is met at the places that were tried: nothing is"
-        in made.stderr
+        "no grasp in the bin is reached at the places tried: nothing is" in made.stderr
     )
 
 

@@ -66,7 +66,7 @@ def test_faces_of_tilted_boxes_and_spheres_are_none():
         (["bin.on=pedestal", "bin.pose.xyz=[0.75,0,0]"], r"hangs \d+ mm over the edge"),
         (
             ["bin.on=pedestal", "bin.pose.rpy_deg=[5,0,0]"],
-            "the bin leans, so it cannot stand flat",
+            "the bin is tilted, so it cannot stand flat",
         ),
     ],
 )

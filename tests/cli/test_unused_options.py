@@ -35,7 +35,7 @@ def run(command: str, **how: object) -> Result:
         ("view a.h5 --html b.html --host 0.0.0.0", "--host: --html has no server."),
         ("view a.h5 --overwrite", "--overwrite: needs --html."),
         ("view a.h5 --path 0,0,0,0 --path 0,0,0,1", "the live view plays one"),
-        ("place-bin a.h5 --bin-pose 0 0 0 0 --fix z=0", "--fix: not used with --bin-pose"),
+        ("place-bin a.h5 --bin-pose 0 0 0 0 --fix z=0", "--fix: not used with"),
         ("place-bin a.h5 --bin-pose 0 0 0 0 --rule paper", "--rule: not used with --"),
         ("bin-scan a.h5 --cell b.yaml", "--cell: PLACEMENT holds the cell"),
         ("bin-scan --dry-run --restart", "--restart: --dry-run writes nothing."),

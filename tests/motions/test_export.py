@@ -146,7 +146,7 @@ def test_one_grasp_and_a_file(map_path: Path, tmp_path: Path) -> None:
         (["--all", "--grasp", "0,0,0"], "name test grasps with --grasp, or take --all"),
         (["--grasp", "9,9,9"], "expected y,x,orientation"),
         (["--grasp", "a,b"], "expected y,x,orientation"),
-        (["--all", "--to", "krl"], "arms of six turning joints"),
+        (["--all", "--to", "krl"], "arm of six revolute joints"),
     ],
 )
 def test_what_cannot_be_exported(

@@ -210,7 +210,7 @@ def test_the_command_says_it_in_words_and_numbers(bin_map, tmp_path):
     out = tmp_path / "parts.json"
     said = CliRunner().invoke(group, [*words, "-o", str(out)])
     assert said.exit_code == 0, said.output
-    assert "parts below the one that is picked are no obstacle" in said.stderr
+    assert "parts below the picked one are not" in said.stderr
     facts = json.loads(CliRunner().invoke(group, [*words, "--json"]).stdout)
     assert f"{facts['picked']} of {facts['parts']} parts picked" in said.stdout
     each = [

@@ -170,7 +170,7 @@ def test_a_stand_reaches_from_the_floor_to_the_base():
     assert after.pose.xyz[2] - after.shape.box[2] / 2 == pytest.approx(foot)
     assert after.pose.xyz[0] == pytest.approx(0.3)
     assert np.allclose(T_world_bin_of(raised.cell), T_world_bin_of(loaded.cell))
-    with pytest.raises(CellError, match="nothing is left of pedestal"):
+    with pytest.raises(CellError, match="no length is left of pedestal"):
         with_base_at(loaded, yaw_transform(0.0, 0.0, -0.9, 0.0), ("pedestal",))
 
 

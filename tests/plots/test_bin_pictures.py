@@ -229,7 +229,7 @@ def test_causes_are_counted_over_all_frames() -> None:
     assert counts == sorted(counts, reverse=True)
     reached = 100.0 * causes.states[Status.PATH_FOUND] / 72.0
     title = draw_causes(bin_map).texts[0].get_text()
-    assert title == f"{reached:.1f} % reached, and why the rest is not"
+    assert title == f"{reached:.1f} % reached; causes of the rest"
 
 
 def test_causes_of_a_workspace_map_cover_all_cubes() -> None:

@@ -190,7 +190,7 @@ def test_the_command_reads_lengths_and_angles(toy, tmp_path):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        ([], "say what is off"),
+        ([], "give an error"),
         (["--bin", "5"], "expected a number with its unit"),
         (["--bin", "5mm 3mm"], "one length and one angle"),
         (["--camera", "1mm"], "there is no camera"),

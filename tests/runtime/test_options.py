@@ -72,7 +72,7 @@ def test_a_hundred_million_workers_cost_nothing(caplog):
     with open_pool(RunOptions(workers=10**8)) as pool:
         assert len(pool.slots(3)) == 3
         assert len(pool.slots(4)) == 4
-    assert caplog.text.count("workers will do instead of 100000000") == 1
+    assert caplog.text.count("workers instead of 100000000") == 1
 
 
 @pytest.mark.parametrize(

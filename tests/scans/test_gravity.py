@@ -243,9 +243,9 @@ def test_cubes_in_the_world_and_in_robot_base_are_one_map(tmp_path):
 def test_a_bin_that_would_spill_is_refused(tmp_path):
     """robot_base hangs, and the default pose of the bin with it."""
     path = hanging_cell(tmp_path, CEILING, way="base_pose")
-    with pytest.raises(CellError, match=r"180 deg off the upright.*bin\.frame: world"):
+    with pytest.raises(CellError, match=r"180 deg from upright.*bin\.frame: world"):
         read_cell(str(path), ["bin.frame=robot_base"])
-    with pytest.raises(CellError, match="90 deg off the upright"):
+    with pytest.raises(CellError, match="90 deg from upright"):
         read_cell(str(path), ["bin.frame=robot_base", "bin.pose={rpy_deg: [90, 0, 0]}"])
     read_cell(str(path), ["bin.frame=robot_base", "bin.pose={rpy_deg: [150, 0, 0]}"])
 
@@ -253,6 +253,6 @@ def test_a_bin_that_would_spill_is_refused(tmp_path):
 def test_levels_that_lean_are_named(tmp_path):
     """A wall makes the levels of robot_base vertical; a ceiling leaves them level."""
     wall = read_cell(str(hanging_cell(tmp_path, WALL, way="base_pose")))
-    assert any("levels lean by 90 deg" in text for text in wall.warnings)
+    assert any("levels are tilted by 90 deg" in text for text in wall.warnings)
     ceiling = read_cell(str(hanging_cell(tmp_path, CEILING, way="base_pose")))
     assert not any("lean" in text for text in ceiling.warnings)

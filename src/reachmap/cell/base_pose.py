@@ -192,7 +192,7 @@ def _longer(body: BodySpec, axis: int, grown_m: float) -> Shape:
     kind, value = body.shape.kind()
     length = round((value[axis] if kind == "box" else value.length) + grown_m, DIGITS_M)
     if length <= 0.0:
-        raise CellError(f"nothing is left of {body.name}, whose far end stays")
+        raise CellError(f"no length is left of {body.name}, whose far end stays")
     if kind == "box":
         sides = list(value)
         sides[axis] = length

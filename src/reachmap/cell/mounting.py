@@ -71,7 +71,7 @@ def write_out_mount(document: Document) -> None:
     place = ("robot", "base_pose")
     own = at(document.data, *place)
     if place in document.places and own is not None and own != pose:
-        document.add(place, "robot.mount says another pose: give one of the two")
+        document.add(place, "contradicts robot.mount: give one of the two")
     document.data["robot"]["base_pose"] = pose
     if body is not None:
         named = {at(item, "name"): item for item in bodies or []}
@@ -115,26 +115,26 @@ def check_bins_stand(document: Document, cell: Cell) -> None:
         if tilt <= MAX_BIN_TILT_DEG:
             continue
         hint = (
-            "robot_base itself leans, so give the pose in the world with "
+            "robot_base itself is tilted, so give the pose in the world with "
             f"{'.'.join(place)}.frame: world"
             if leans and spec.frame == "robot_base"
             else "its z axis must point up"
         )
         document.add(
             (*place, "pose"),
-            f"the bin stands {tilt:.0f} deg off the upright in the world and would "
+            f"the bin is tilted {tilt:.0f} deg from upright in the world and would "
             f"spill (allowed: {MAX_BIN_TILT_DEG:g}); {hint}",
         )
 
 
 def leaning_levels(cell: Cell) -> str:
-    """Say that the levels of the workspace scan are not level, "" where they are."""
+    """Warning that the levels of the workspace scan are not horizontal, or ""."""
     R_world_grid = cell.robot.base_pose.matrix()[:3, :3] @ cell.T_base_grid()[:3, :3]
     tilt = tilt_rad(R_world_grid)
     lean = float(np.degrees(min(tilt, np.pi - tilt)))
     if lean < np.degrees(UPRIGHT_RAD):
         return ""
     return (
-        f"workspace_scan.cubes: the levels lean by {lean:.3g} deg, as robot_base does; "
-        "workspace_scan.frame: world makes them horizontal"
+        f"workspace_scan.cubes: the levels are tilted by {lean:.3g} deg, as robot_base "
+        "is; workspace_scan.frame: world makes them horizontal"
     )

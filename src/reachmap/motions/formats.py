@@ -63,7 +63,7 @@ class Origin:
             f"joints {', '.join(self.joint_names)}: signs and zeros of the URDF",
             "joint motions with an exact stop at every point (blend radius 0), as "
             "verified; do not blend",
-            "each begins at its first point, the scan configuration; the way there was "
+            "each starts at its first point, the scan configuration; the way there was "
             "not verified",
         ]
 
@@ -222,6 +222,6 @@ def _name(motion: Motion) -> str:
 def _require_six(origin: Origin, language: str) -> None:
     if len(origin.joint_names) != 6 or not origin.is_revolute.all():
         raise SettingsError(
-            f"--to {language}: is written for arms of six turning joints (this one has "
+            f"--to {language}: needs an arm of six revolute joints (this one has "
             f"{', '.join(origin.joint_names)}); take csv, json or joint-trajectory"
         )

@@ -13,7 +13,7 @@ from reachmap.core.collision.bin_fit import BinFit
 from reachmap.errors import SceneError
 from reachmap.geometry import inverse_transform
 from reachmap.maps.records import Status
-from reachmap.maps.summary.nothing import likeliest_cause
+from reachmap.maps.summary.nothing import most_likely_cause
 from reachmap.placement.mapped.candidates import Candidate, CandidateTable
 from reachmap.placement.mapped.exact import PlacedScene, Pose
 from reachmap.placement.mapped.imaging import UNSEEN
@@ -173,7 +173,7 @@ def why_no_place(problem: PlacementProblem, decision: Decision) -> str:
     status = survey.status.copy()
     status[status == Status.NOT_ATTEMPTED] = Status.NO_PATH_FOUND
     pairs = placed.scene.checker.body_pairs
-    why = likeliest_cause(status, survey.blocking_pair, pairs)
+    why = most_likely_cause(status, survey.blocking_pair, pairs)
     x, y, z, yaw = best.pose
     return (
         f"{problem.loaded.source}: no place for the bin: even at x={x:.3f} y={y:.3f} "

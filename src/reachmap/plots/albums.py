@@ -105,7 +105,7 @@ def _picture(
 
 
 def _causes_picture(record: WorkspaceMap | BinMap, name: str) -> Picture:
-    title = "States of the test frames, and what is in the way"
+    title = "States of the test frames, and bodies in the way"
     return _picture(name, title, draw_causes, record)
 
 
@@ -197,12 +197,12 @@ def _layer_pictures(
     title = "Path reachability of test grasps, directions and points"
     name = f"bin_directions{end}"
     yield _picture(name, title, draw_directions, bin_map, layer, **style)
-    title = "What reaching into the bin costs"
+    title = "Cost of reaching into the bin"
     yield _picture(f"bin_costs{end}", title, draw_costs, bin_map, cost, layer)
     title = "Which approach directions and rolls work where"
     yield _picture(f"bin_approach{end}", title, draw_approach, bin_map, layer)
     if bin_map.margins is not None:
-        title = "Clearance on the way in"
+        title = "Clearance on the path to the grasp"
         yield _picture(f"bin_clearance{end}", title, draw_clearance, bin_map, layer)
     if bin_map.cycle is not None:
         title = "Whole picks in the bin"
@@ -308,5 +308,5 @@ def base_album(
     placement: BasePlacement, *, percent_map: PercentMap = "RdYlGn"
 ) -> list[Picture | Table]:
     """List the picture of a place of an arm."""
-    title = "Where the arm goes"
+    title = "Where the robot goes"
     return [_picture("robot", title, draw_base, placement, percent_map)]

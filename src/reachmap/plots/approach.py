@@ -254,8 +254,8 @@ def _draw_key(
 ) -> None:
     """One large sunburst with words, to read the small ones by."""
     put_text(figure, left, top - 0.12, "At each point", fontsize=9.5, fontweight="bold")
-    lean = "ring: the tool leans to that side"
-    lines = ["middle: the tool stands upright", lean]
+    lean = "ring: the tool is tilted to that side"
+    lines = ["middle: the tool is upright", lean]
     if len({sector.inner for sector in sectors}) == 1:
         lines = [lean]
     for index, line in enumerate([*lines, "slices of a sector: its rolls, in order"]):

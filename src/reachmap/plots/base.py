@@ -220,7 +220,7 @@ def _put_words(
     figure: Figure, placement: BasePlacement, handles: Sequence[Artist]
 ) -> None:
     words = base_words(placement)
-    put_title(figure, LEFT, "Where the arm goes", words[0])
+    put_title(figure, LEFT, "Where the robot goes", words[0])
     for number, text in enumerate(words[1:]):
         line = put_text(figure, LEFT, BOTTOM - 0.68 - number * LINE, text)
         fit_width(figure, LEFT, line)

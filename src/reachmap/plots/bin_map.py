@@ -188,8 +188,10 @@ def draw_clearance(bin_map: BinMap, layer: int = 0) -> Figure:
         )
     ]
     view = view_of(bin_map)
-    said = f"least distance of two bodies on the way in · {_subtitle(view, layer)}"
-    return _draw_panels(bin_map, view, panels, "How close it gets", said)
+    said = (
+        f"smallest distance between two bodies on the path · {_subtitle(view, layer)}"
+    )
+    return _draw_panels(bin_map, view, panels, "Clearance", said)
 
 
 @drawing()
@@ -220,7 +222,7 @@ def draw_cycle(
         _Panel(title="Cycle time", unit="s", values=seconds, digits=_digits(seconds)),
     ]
     view = view_of(bin_map)
-    said = f"test grasps with lift, transfer and way back · {_subtitle(view, layer)}"
+    said = f"test grasps with lift, transfer and return · {_subtitle(view, layer)}"
     title = "Whole picks in the bin"
     return _draw_panels(bin_map, view, panels, title, said, percent_map)
 
@@ -246,7 +248,7 @@ def draw_costs(
     view = view_of(bin_map)
     panels = _cost_panels(bin_map, cost, layer)
     said = f"mean over the test grasps reached at each point · {_subtitle(view, layer)}"
-    return _draw_panels(bin_map, view, panels, "What reaching into the bin costs", said)
+    return _draw_panels(bin_map, view, panels, "Cost of reaching into the bin", said)
 
 
 def _draw_panels(

@@ -67,7 +67,7 @@ def draw_causes(record: WorkspaceMap | BinMap) -> Figure:
     put_title(
         figure,
         0.35,
-        f"{reached:.1f} % reached, and why the rest is not",
+        f"{reached:.1f} % reached; causes of the rest",
         " · ".join(part for part in said if part),
     )
     return figure

@@ -213,7 +213,7 @@ def _draw_bins(
             )
         )
     outlines += [
-        dataclasses.replace(outline, name=f"{outline.name} (stands on)")
+        dataclasses.replace(outline, name=f"{outline.name} (support)")
         for outline in context.standing
         if placement.support and outline.name == placement.support
     ]

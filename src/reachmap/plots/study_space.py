@@ -87,7 +87,7 @@ def draw_pareto(study: Study, first: int, second: int) -> Figure:
     unmet = known & ~front & (study.feasible == 0)
     axes.plot(x[rest], y[rest], "o", color=MUTED, markersize=4, label="variants")
     if unmet.any():
-        axes.plot(x[unmet], y[unmet], "x", color=MUTED, label="breaks a requirement")
+        axes.plot(x[unmet], y[unmet], "x", color=MUTED, label="violates a requirement")
     order = np.flatnonzero(front)[np.argsort(x[front], kind="stable")]
     axes.plot(x[order], y[order], "-o", color=BIN_COLOUR, label="Pareto front")
     if study.base >= 0 and known[study.base]:
@@ -103,9 +103,7 @@ def draw_pareto(study: Study, first: int, second: int) -> Figure:
     axes.grid(color="#e4e4e4", linewidth=0.7)
     axes.set_axisbelow(True)
     axes.legend(frameon=False, fontsize=7.5)
-    said = (
-        f"{int(front.sum())} of {int(known.sum())} variants are dominated by no other"
-    )
+    said = f"{int(front.sum())} of {int(known.sum())} variants are Pareto-optimal"
     put_title(figure, LEFT, f"{names[0]} against {names[1]}", said)
     return figure
 
@@ -232,7 +230,12 @@ def draw_interactions(
         figure, mesh, (left - GAP + 0.15, BOTTOM, 0.14, height), f"[{unit}]",
         step=20.0 if unit == "%" else None,
     )  # fmt: skip
-    put_title(figure, LEFT, f"{name} over every two parameters", "means over all else")
+    put_title(
+        figure,
+        LEFT,
+        f"{name} over every two parameters",
+        "means over all other parameters",
+    )
     return figure
 
 

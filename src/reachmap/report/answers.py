@@ -124,9 +124,9 @@ def _clearance(run: RunFolder) -> Tile | None:
     middle = shares[len(shares) // 2]
     room = number(1000 * middle.clearance_m, 0, "mm")
     return _tile(
-        "How exactly must the cell be built?",
+        "How accurately must the cell be built?",
         f"{percent(middle.frames)} with {room} to spare",
-        f"By the least distance of any two bodies on the way: {steps}.",
+        f"By the smallest distance between any two bodies on the path: {steps}.",
     )
 
 
@@ -135,7 +135,7 @@ def _cycle(run: RunFolder) -> Tile | None:
     found = None if run.bin_map is None else summarise_cycle(run.bin_map)
     if found is None:
         return None
-    question = "What does a pick take, with the part in hand?"
+    question = "How long does a pick take, with the part in hand?"
     whole = f"{percent(found.reachability)} of the test grasps have a whole cycle"
     made = found.throughput
     if made is None:
@@ -161,8 +161,8 @@ def _emptying(run: RunFolder) -> Tile | None:
     )
     sentence = found.sentence
     return _tile(
-        "Will it empty the bin, and what stays behind?",
-        f"{number(found.left, 0 if found.left >= 1 else 1)} % stay",
+        "Will it empty the bin, and what remains?",
+        f"{number(found.left, 0 if found.left >= 1 else 1)} % remain",
         f"{sentence[0].upper()}{sentence[1:]}.",
         f"Points that can be picked by the height of the parts: {points}.",
     )

@@ -45,12 +45,12 @@ def cause_section(maps: dict[str, WorkspaceMap | BinMap]) -> Section:
         ]
     return section(
         "causes",
-        "Why the rest is not reached",
+        "Why poses are not reached",
         paragraph(
             f"{_no_solution(maps)} Where every solution "
-            "collides, the two bodies named stand in the way: a slimmer housing, a "
-            "lower wall or another place would free it. Where no path was found, the "
-            "pose is free, but planning did not get there with the effort stored below."
+            "collides, the two bodies named are in the way: a slimmer housing, a "
+            "lower wall or another place would help. Where no path was found, the pose "
+            "is free, but planning did not reach it with the effort stated below."
         ),
         parts,
     )

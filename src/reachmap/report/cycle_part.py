@@ -34,9 +34,7 @@ def cycle_blocks(record: BinMap) -> Blocks:
             )
         )
     if cycle.whole:
-        said = (
-            "Where the seconds of a pick go; lines span the middle 80 % of each part."
-        )
+        said = "Time of a pick by stage; lines span the middle 80 % of each stage."
         blocks.append(drawn(draw_timeline(record, cycle), said, record))
     if cycle.ends:
         rows = [
@@ -50,7 +48,7 @@ def cycle_blocks(record: BinMap) -> Blocks:
 
 def _words(cycle: CycleSummary) -> str:
     text = (
-        f"Of {count(cycle.reached, 'test grasp')} with a way in, {cycle.whole} have a "
+        f"Of {count(cycle.reached, 'reached test grasp')}, {cycle.whole} have a "
         f"whole cycle ({percent(cycle.reachability)} of all test grasps): "
         f"{cycle.sentence}."
     )
@@ -62,7 +60,7 @@ def _words(cycle: CycleSummary) -> str:
     if made is None:
         return text
     return (
-        f"{text} With the planning effort and the risk of failure that is "
+        f"{text} With planning effort and the risk of failure that makes "
         f"{number(made.picks_per_hour, 0)} picks per hour "
         f"(95 % interval {number(made.low, 0)} to {number(made.high, 0)})."
     )

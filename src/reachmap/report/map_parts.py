@@ -71,9 +71,9 @@ def workspace_section(record: WorkspaceMap) -> Section:
         "What the arm reaches around its base",
         paragraph(
             f"{count(summary.frames, 'tool pose')} were tested. A pose counts as "
-            "reached when a path without any collision leads to it, and that path was "
-            "checked again, finely, from end to end. Inverse kinematics alone promises "
-            "more; the difference is what camera, tool and surroundings take away."
+            "reached if a collision-free path leads to it that was verified at fine "
+            "resolution from end to end. Inverse kinematics alone promises more; the "
+            "difference is lost to camera, tool and surroundings."
         ),
         _level_table(summary),
         pictures,
@@ -96,12 +96,12 @@ def _level_table(summary: WorkspaceSummary) -> Table:
                 f"{level.full_squares} of {level.squares}",
             )
         )
-    head = ("z [m]", "path", "IK free of collision", "IK alone", "squares at 100 %")
+    head = ("z [m]", "path", "collision-free IK", "IK alone", "squares at 100 %")
     return table(head, rows, "<>>>>")
 
 
 def placement_section(record: BinPlacement, workspace: WorkspaceMap | None) -> Section:
-    """Chosen pose, its margin and its rivals.
+    """Chosen pose, its margin and its alternatives.
 
     Parameters
     ----------
@@ -123,7 +123,7 @@ def placement_section(record: BinPlacement, workspace: WorkspaceMap | None) -> S
         paragraph(_margin_words(summary)),
         drawn(
             draw_placement(record, workspace),
-            "The chosen bin, its rivals, and every place that was considered.",
+            "The chosen bin, its alternatives, and every place considered.",
             record,
         ),
         _excluded(summary),
@@ -174,7 +174,7 @@ def _excluded(summary: PlacementSummary) -> Blocks:
         return None
     rows = [(reason, number) for reason, number in summary.excluded.items()]
     return [
-        Heading("Why other places are out of the question"),
+        Heading("Why other places are excluded"),
         table(("reason", "poses"), rows[:REASONS_SHOWN], "<>"),
     ]
 
@@ -191,7 +191,7 @@ def bin_section(record: BinMap) -> Section:
             pictures.append(
                 drawn(
                     draw_clearance(record, layer),
-                    f"How close bodies come on the way in{where} [mm].",
+                    f"Clearance on the path to the grasp{where} [mm].",
                     record,
                 )
             )
@@ -203,7 +203,7 @@ def bin_section(record: BinMap) -> Section:
             ),
             drawn(
                 draw_directions(record, layer),
-                "A part needs one roll, and one direction, not all: the share of test "
+                "A pick needs only one roll and one direction: the share of test "
                 f"grasps, of directions and of points that are reached{where}.",
                 record,
             ),
@@ -214,7 +214,7 @@ def bin_section(record: BinMap) -> Section:
             ),
             drawn(
                 draw_costs(record, cost, layer),
-                f"What reaching costs{where}: path, planning, execution, and J.",
+                f"Costs{where}: path length, planning and execution time, and J.",
                 record,
             ),
         ]
@@ -232,7 +232,7 @@ def bin_section(record: BinMap) -> Section:
         _shares_paragraph(summary),
         _saturation(record),
         _evidence_paragraph(summary.unreached),
-        Heading("What the way to a grasp takes"),
+        Heading("Cost of the path to a grasp"),
         _measure_table(summary),
     )
 
@@ -269,7 +269,7 @@ def _saturation(record: BinMap) -> Blocks:
 
 
 def _evidence_paragraph(evidence: EvidenceSummary | None) -> Blocks:
-    """What stands behind test grasps without a path."""
+    """Evidence behind test grasps without a path."""
     if evidence is None or not evidence.frames or evidence.checks is None:
         return None
     methods = ", ".join(f"{n} {c:,}" for n, c in evidence.method_checks.items())

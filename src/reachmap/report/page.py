@@ -107,9 +107,9 @@ def _sections(run: RunFolder, cell: LoadedCell | str) -> list[Section]:
 
 
 def _missing(run: RunFolder) -> list[Bullets]:
-    """Say plainly what is not there, what cannot be used and what does not fit."""
+    """List what is missing, unusable or inconsistent."""
     items: list[tuple[object, ...]] = [
-        (Strong(name), " is not in this folder; ", Code(how), " makes it")
+        (Strong(name), " is not in this folder; create it with ", Code(how))
         for name, how in run.missing.items()
     ]
     items += [(warning,) for warning in [*run.warnings, *chain_warnings(run)]]

@@ -65,8 +65,8 @@ def ranking_section(
             parts.append(
                 drawn(
                     ranking_chart(own[:MAX_GROUPS], names[cost], TOP),
-                    f"Mean {what} of the first grasps, as supplied and re-ranked; the "
-                    "map is all that was asked.",
+                    f"Mean {what} of the first grasps, as supplied and re-ranked, "
+                    "according to the map.",
                     record,
                 )
             )

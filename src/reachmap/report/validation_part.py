@@ -17,9 +17,9 @@ from reachmap.report.numbers import NONE, number, percent, signed
 from reachmap.report.ranked_rows import known_number
 
 SHARES = {
-    "precision": "called reachable, and reached",
-    "recall": "reached, and called reachable",
-    "false_positive_rate": "not reached, but called reachable",
+    "precision": "precision (called reachable and reached)",
+    "recall": "recall (reached and called reachable)",
+    "false_positive_rate": "false-positive rate",
 }
 
 
@@ -41,8 +41,8 @@ def validation_section(facts: Mapping[str, Any]) -> Section:
         "validation",
         "The map tested against planning",
         paragraph(
-            "Every grasp was planned to for real, and the outcome compared with what "
-            f"the map had said{f' ({said})' if said else ''}. Intervals are 95 % "
+            "A path was planned to every grasp, and the outcome compared with the "
+            f"map's prediction{f' ({said})' if said else ''}. Intervals are 95 % "
             "(Wilson)."
         ),
         _list_table(lists),

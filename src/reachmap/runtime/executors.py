@@ -167,7 +167,7 @@ class _ProcessSlots:
             return [self._here]
         count = worker_count(self._workers, min(units, most or units))
         if not self._slots and self._workers > max(count, available_cores()):
-            log.warning("%d workers will do instead of %d", count, self._workers)
+            log.warning("using %d workers instead of %d", count, self._workers)
         while len(self._slots) < count:
             self._slots.append(_ProcessSlot())
         return self._slots[:count]

@@ -105,7 +105,7 @@ def header_of_line(line: bytes) -> Header:
         where = ".".join(str(part) for part in first["loc"])
         if where == "format_version":
             raise ValueError(
-                f"it was begun by a version of reachmap that has format "
+                f"it was started by a version of reachmap with format "
                 f"{first['input']!r} (this one has 2.0), and only that can finish it"
             ) from None
         raise ValueError(f"its header: {where}: {first['msg']}") from None

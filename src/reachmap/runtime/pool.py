@@ -275,7 +275,7 @@ class _Round:
         elif len(indices) == 1:
             self._strike(slot, indices[0], 1)
         elif indices:
-            log.info("workers died over units %s: each is tried alone", indices)
+            log.info("workers died at units %s: each is tried alone", indices)
             slot.suspects.extend(indices)
 
     def _count_failed_start(self, error: BaseException) -> None:
@@ -283,8 +283,8 @@ class _Round:
         most = FAILED_RESTARTS if self._was_ready else FAILED_STARTS
         if self._failed_starts >= most:
             raise EngineError(
-                f"workers died {most} times before their first unit ({error}): is "
-                "memory short? Try fewer workers, or one (-j 1) to see the error itself"
+                f"workers died {most} times before their first unit ({error}): out of "
+                "memory? Try fewer workers, or one (-j 1) to see the error itself"
             ) from error
 
     def _strike(self, slot: Slot, index: int, deaths: int) -> None:
@@ -307,7 +307,7 @@ def _exception(future: Future[Any]) -> BaseException | None:
         return future.exception()
     except CancelledError:
         return IncompleteError(
-            "the executor dropped its work (has the scheduler gone?); what is done is "
+            "the executor dropped its work (did the scheduler stop?); finished work is "
             "kept; run the same command again to resume"
         )
 

@@ -115,7 +115,7 @@ class Store(Entries):
         return f"{units} are safe {where or f'in {self.path}'}"
 
     def _failure(self, error: OSError) -> IncompleteError:
-        remedy = "free some space" if error.errno in NO_ROOM else "see to that"
+        remedy = "free some space" if error.errno in NO_ROOM else "fix the cause"
         return IncompleteError(
             f"{self.path}: {error.strerror}; {self.safe_text('there')}; {remedy}, then "
             "run the same command again to resume"
@@ -126,7 +126,7 @@ class Store(Entries):
         os.ftruncate(self._descriptor, self.end)
         if self.damaged or self.copies < 2:
             log.warning(
-                "%s: %d damaged lines; what they held is done again",
+                "%s: %d damaged lines; their work is repeated",
                 *(self.path, self.damaged),
             )
         line = self._header_line + b"\n"

@@ -20,7 +20,7 @@ from reachmap.geometry import (
     yaw_transform,
 )
 from reachmap.maps.records import NO_PAIR, Status
-from reachmap.maps.summary.nothing import likeliest_cause
+from reachmap.maps.summary.nothing import most_likely_cause
 from reachmap.sampling.frames import FrameGrid, approach_distance_m, bin_test_frames
 from reachmap.tools.trial import reach_of
 
@@ -139,15 +139,13 @@ def guess_bin(
 def guess_notes(guess: BinGuess, tip: str) -> list[str]:
     """What is unusual about the bin and the tool that were guessed."""
     if not guess.share:
-        return [
-            f"no grasp in the bin is met at the places that were tried: {guess.why}"
-        ]
+        return [f"no grasp in the bin is reached at the places tried: {guess.why}"]
     notes = []
-    few = "few grasps are met"
+    few = "few grasps are reached"
     if guess.odd_place:
         where = ", ".join(f"{value:g}" for value in guess.xyz_m)
         why = few if guess.tool_m > guess.carried_m else guess.why or few
-        reason = f"it would meet {guess.avoided}" if guess.avoided else why
+        reason = f"it would collide with {guess.avoided}" if guess.avoided else why
         notes.append(f"the bin stands at ({where}): in front of the base {reason}")
     if guess.tool_m > guess.carried_m:
         where = f"the end of what the URDF has there ({guess.carried_m:g} m)"
@@ -162,8 +160,8 @@ def guess_notes(guess: BinGuess, tip: str) -> list[str]:
         )
     if guess.share < ENOUGH:
         notes.append(
-            f"{guess.share:.0%} of a few test grasps are met there: reachmap place-bin "
-            "looks for better places, reachmap bin-scan says what is in the way"
+            f"{guess.share:.0%} of a few test grasps are reached there: reachmap "
+            "place-bin finds better places, reachmap bin-scan says what is in the way"
         )
     return notes
 
@@ -239,7 +237,7 @@ class _Trial:
         return float(_free(scene, T).sum() / len(self._T))
 
     def why_nothing(self, tool_m: float) -> str:
-        """Likeliest cause why nothing is met with a tool."""
+        """Most likely reason why nothing is reached with a tool."""
         scene = self._scene()
         Q, frame, free = _solutions(scene, self._T @ _along(scene, -tool_m))
         status = np.full(len(self._T), Status.NO_IK, np.uint8)
@@ -250,7 +248,7 @@ class _Trial:
         for k, row in zip(*np.unique(frame, return_index=True), strict=True):
             if status[k] == Status.IK_IN_COLLISION:
                 pair[k] = scene.checker.touching_pairs(Q[row])[0]
-        return likeliest_cause(status, pair, scene.checker.body_pairs)
+        return most_likely_cause(status, pair, scene.checker.body_pairs)
 
 
 def _along(scene: Scene, distance_m: float) -> FloatArray:

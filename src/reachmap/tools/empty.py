@@ -247,12 +247,12 @@ def _draw(path: Path, bin_map: BinMap, answer: EmptyAnswer, *, overwrite: bool) 
     from reachmap.plots.cell.emptied import draw_emptied
     from reachmap.plots.parts.files import write_picture
 
-    title = f"{answer.left_percent:.1f} % of parts of {_mm(answer.part)} mm stay"
+    title = f"{answer.left_percent:.1f} % of parts of {_mm(answer.part)} mm remain"
     heaps = [(one.heap, one.emptied) for one in answer.heaps]
     write_picture(
         path,
         draw_emptied(bin_map, heaps, title),
-        title="What stays in the bin",
+        title="Parts that remain in the bin",
         config_sha256=bin_map.stamp.config_sha256,
         overwrite=overwrite,
     )
@@ -298,7 +298,7 @@ def _check_part(cell: Cell, part: tuple[float, float, float], fill: float) -> No
     volume = np.prod(cell.bin.inner) * fill
     if volume / np.prod(part) > MAX_PARTS:
         raise SettingsError(
-            f"--part: more than {MAX_PARTS} of {_mm(part)} mm go into the bin"
+            f"--part: more than {MAX_PARTS} of {_mm(part)} mm fit into the bin"
         )
 
 
@@ -306,8 +306,8 @@ def _warn(cell: Cell, bin_map: BinMap, map_path: Path) -> None:
     """Say what the map does not know about heaps."""
     if not cell.bin_scan.is_filled:
         logger.warning(
-            "%s: made in an empty bin, where parts below the one that is picked are no "
-            "obstacle (bin_scan.fill scans it at levels of filling)",
+            "%s: made in an empty bin, where parts below the picked one are not "
+            "obstacles (bin_scan.fill scans several levels of filling)",
             map_path,
         )
     elif len(bin_map.layer) == 1:

@@ -98,7 +98,7 @@ def place_bins(
     check_choice(choice)
     names = bin_names(workspace)
     if choice.bin_pose is not None:
-        raise SettingsError("--bin-pose is of one bin: name it (--bin NAME)")
+        raise SettingsError("--bin-pose is for one bin: name it (--bin NAME)")
     files = {name: named_output(output, name) for name in names}
     pictures = {
         name: None if picture is None else named_output(picture, name) for name in names

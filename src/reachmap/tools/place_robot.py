@@ -161,7 +161,7 @@ def _check(choice: RobotChoice) -> None:
             fits = False
         if not fits:
             raise SettingsError(
-                f"--mount {name!r:.40}: expected {', '.join(LEANS_DEG)} or a lean from "
+                f"--mount {name!r:.40}: expected {', '.join(LEANS_DEG)} or a tilt from "
                 "0 to 180 [deg]"
             )
     if choice.rail and (choice.mountings or choice.fixed or set(choice.limits) - {"x"}):
@@ -325,7 +325,7 @@ def _draw(path: Path, placement: BasePlacement, run: RunOptions) -> None:
     write_picture(
         path,
         draw_base(placement),
-        title="Where the arm goes",
+        title="Where the robot goes",
         config_sha256=placement.stamp.config_sha256,
         overwrite=run.overwrite,
     )

@@ -210,8 +210,8 @@ def ranker_of(
     ranker = Ranker(bin_map, basis, known)
     if ranker.table.basis != basis:
         logger.warning(
-            "%s: has no counts of state checks (format %s), so that planning times are "
-            "those measured, which differ from run to run; scan again for a lasting "
+            "%s: has no counts of state checks (format %s), so measured planning times "
+            "are used, which differ from run to run; scan again for a reproducible "
             "order",
             map_path,
             bin_map.stamp.format_version,
@@ -242,7 +242,7 @@ def _check_cell(
     message = f"{map_path}: was made for another cell than {cell}"
     message += f" (different: {', '.join(different)})"
     if not force:
-        raise MapFileError(f"{message}; scan again, or rank all the same with --force")
+        raise MapFileError(f"{message}; scan again, or rank anyway with --force")
     logger.warning("%s", message)
 
 

@@ -110,7 +110,7 @@ def _check(errors: Errors, samples: int, margin_m: float) -> None:
     sizes = np.array([dataclasses.astuple(size) for size in _sizes(errors)])
     if not sizes.any():
         raise SettingsError(
-            "say what is off: --bin 5mm 1deg, --camera 1mm 0.1deg or --tool 2mm"
+            "give an error: --bin 5mm 1deg, --camera 1mm 0.1deg or --tool 2mm"
         )
     if (sizes < 0).any() or (sizes > [MAX_SHIFT_M, MAX_TURN_RAD]).any():
         raise SettingsError("errors must be 0 to 500 mm and 0 to 45 deg")

@@ -297,8 +297,7 @@ def _calibrate(validation: Validation, path: Path, *, overwrite: bool) -> None:
     text = json.dumps(found.document(), indent=1, allow_nan=False)
     publish(path, [text.encode("ascii"), b"\n"], overwrite=overwrite)
     logger.warning(
-        "%s: %d grasps, %d reached; calibration error %.3f, each grasp judged by the "
-        "others",
+        "%s: %d grasps, %d reached; cross-validated calibration error %.3f",
         path,
         found.grasps,
         found.reached,

@@ -128,11 +128,11 @@ def calibrate(
 
 
 def check_number(grasps: int) -> None:
-    """Raise SettingsError where there are too few grasps that a map speaks about."""
+    """Raise SettingsError where too few grasps lie within the map."""
     if grasps < LEAST_GRASPS:
         raise SettingsError(
-            f"--calibrate: needs {LEAST_GRASPS} grasps or more that the map speaks "
-            f"about (got {grasps}); add some with --random"
+            f"--calibrate: needs {LEAST_GRASPS} grasps or more within the map "
+            f"(got {grasps}); add some with --random"
         )
 
 

@@ -103,6 +103,6 @@ def free_port(port: int, host: str = HOST) -> int:
             reason = getattr(error, "strerror", None) or error
             raise OutputError(
                 f"port {port} cannot be used on {host} ({reason}); "
-                "--port names another, --port 0 any free one"
+                "choose another with --port, or any free one with --port 0"
             ) from error
         return int(probe.getsockname()[1])

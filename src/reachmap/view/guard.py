@@ -51,10 +51,10 @@ class Guard:
             return "expected one Host"
         host = hosts[0].lower()
         if not self.token and not is_loopback(urlsplit(f"//{host}").hostname or ""):
-            return "this name is not one of this machine"
+            return "not a name of this machine"
         own = (f"http://{host}", f"https://{host}")
         if any(page.lower() not in own for page in request.headers.get_all("Origin")):
-            return "another page must not look here"
+            return "requests from other pages are refused"
         if self.token and not (self._in_address(request) or self._in_cookie(request)):
             return "expected the address that reachmap printed, with its token"
         return ""

@@ -145,7 +145,7 @@ def test_what_a_joint_limits_file_says_in_vain_is_said(tmp_path: Path) -> None:
     factor, names = loaded.warnings
     assert "limits.yaml:1:34: default_velocity_scaling_factor: 0.1" in factor
     assert "robot.limits.scaling" in factor
-    assert "limits.yaml:4:3: not joints of the robot, passed over: ur_j1" in names
+    assert "limits.yaml:4:3: ignored, not joints of the robot: ur_j1" in names
 
 
 def test_keys_that_are_not_read_are_named(tmp_path: Path) -> None:
@@ -229,4 +229,4 @@ def test_states_of_virtual_joints_are_passed_over(tmp_path: Path) -> None:
     loaded = load(tmp_path, urdf, "l1", ["j1"], [
         "robot.srdf=r.srdf", "scan_configuration={group_state: home}"])  # fmt: skip
     assert loaded.scan_configuration_rad == {"j1": 0.5}
-    assert "collisions of links that the URDF lacks" in loaded.warnings[0]
+    assert "collisions of links not in the URDF" in loaded.warnings[0]

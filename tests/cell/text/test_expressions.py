@@ -74,7 +74,7 @@ def test_nothing_but_numbers_comes_out(text: str) -> None:
 def test_parameters_may_not_refer_to_each_other_in_a_circle() -> None:
     """The circle is spelled out."""
     evaluator = Evaluator({"a": "=b", "b": "=a + 1"})
-    with pytest.raises(ExpressionError, match="in a circle: a → b → a"):
+    with pytest.raises(ExpressionError, match="circular parameters: a → b → a"):
         evaluator.number("=a")
 
 

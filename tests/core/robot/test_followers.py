@@ -183,7 +183,7 @@ def test_followers_of_followers_are_composed(tmp_path: Path) -> None:
     names = list(arm.body_model.names)[1:]
     assert q[names.index("jb")] == pytest.approx(2 * (3 * 0.1 + 1) + 0.5)
     circle = [e.replace('<mimic joint="j1"', '<mimic joint="jb"') for e in chain]
-    with pytest.raises((CellError, SceneError), match="mimics in a circle"):
+    with pytest.raises((CellError, SceneError), match="circular mimics"):
         scene(tmp_path, *circle)
 
 

@@ -49,7 +49,7 @@ def test_what_stays_is_named_by_its_wall():
         assert found.left == pytest.approx(100 / 6 * 0.5)
         assert found.empties_to_m == pytest.approx(0.1)
         assert found.sentence == (
-            f"empties to 100 mm; the last 8 % stay along the {wall} wall"
+            f"empties to 100 mm; the last 8 % remain along the {wall} wall"
         )
         assert [level.points for level in found.levels] == pytest.approx(
             [100 * 5 / 6, 100, 100]

@@ -1,10 +1,10 @@
-"""The likeliest cause of a map without a reachable frame."""
+"""The most likely cause of a map without a reachable frame."""
 
 import numpy as np
 import pytest
 
 from reachmap.maps import Status
-from reachmap.maps.summary.nothing import likeliest_cause
+from reachmap.maps.summary.nothing import most_likely_cause
 
 PAIRS = ("housing | bin wall +x", "forearm_link | post")
 
@@ -15,7 +15,7 @@ def cause(counts, pairs=()):
     pair = np.full(len(status), -1)
     rows = np.flatnonzero(status == Status.IK_IN_COLLISION)
     pair[rows[: len(pairs)]] = pairs
-    return likeliest_cause(status, pair, PAIRS)
+    return most_likely_cause(status, pair, PAIRS)
 
 
 def test_one_reachable_frame_is_not_nothing():
@@ -35,7 +35,7 @@ def test_one_reachable_frame_is_not_nothing():
 def test_the_commonest_state_is_the_cause(counts, words):
     """With the counts of all states, the commonest first."""
     text = cause(counts)
-    assert words in text.split("likeliest cause")[1]
+    assert words in text.split("most likely cause")[1]
     assert "of 10 test frames" in text
     assert text.index(" 7") < text.index(" 3")
 

@@ -4,7 +4,7 @@
 ! base robot_base; TCP in tool0, 4x4 by rows [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0.25, 0, 0, 0, 1]
 ! joints joint_1, joint_2, joint_3, joint_4, joint_5, joint_6: signs and zeros of the URDF
 ! joint motions with an exact stop at every point (blend radius 0), as verified; do not blend
-! each begins at its first point, the scan configuration; the way there was not verified
+! each starts at its first point, the scan configuration; the way there was not verified
 MODULE reachmap_motions
   PROC to_grasp_0_3_7_12()
     MoveAbsJ [[0.0000000, -85.9436693, 71.6197244, 14.3239449, -85.9436693, 7.1619724], [9E9, 9E9, 9E9, 9E9, 9E9, 9E9]], v1000, fine, tool0;

@@ -138,7 +138,7 @@ def _stood(
         )
         return None
     if np.degrees(tilt_rad(T_world_bin[:3, :3])) > STEADY_DEG:
-        document.add(where, f"the bin leans, so it cannot stand flat on {name!r}")
+        document.add(where, f"the bin is tilted, so it cannot stand flat on {name!r}")
         return None
     over = faces[0].overhang_m(footprint_of_bin(spec, T_world_bin))
     if over > SLACK_M:

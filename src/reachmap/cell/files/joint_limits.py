@@ -81,7 +81,7 @@ def parse_joint_limits(
     if unknown:
         place = document.place(("joint_limits", unknown[0]), of_key=True)
         shown = ", ".join(unknown[:10]) + (", …" if len(unknown) > 10 else "")
-        notes.append(f"{place}: not joints of the robot, passed over: {shown}")
+        notes.append(f"{place}: ignored, not joints of the robot: {shown}")
     return MoveItFile(joints=limits, notes=tuple(notes))
 
 
@@ -94,7 +94,7 @@ def _scaling_notes(document: Document) -> list[str]:
         if value is not None and value != 1:
             notes.append(
                 f"{document.place((key,))}: {key}: {value!r:.20} is not applied; to "
-                "drive the arm slower give robot.limits.scaling in the cell"
+                "slow the arm down set robot.limits.scaling in the cell"
             )
     return notes
 

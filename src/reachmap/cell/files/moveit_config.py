@@ -74,7 +74,7 @@ def _the_srdf(folder: Path, places: Sequence[Path], robot: str) -> Path | None:
             names = ", ".join(path.name for path in found)
             raise SettingsError(
                 f"--moveit-config {folder}: several SRDFs ({names}) and none is called "
-                f"{robot}; leave the others out of a copy"
+                f"{robot}; use a copy of the folder without the others"
             )
     return None
 

@@ -48,7 +48,7 @@ def read_scene(path: Path) -> tuple[list[SceneBody], list[str]]:
     Raises
     ------
     CellError
-        A ``.scene`` file is cut short or holds something else than numbers.
+        A ``.scene`` file is truncated or holds something other than numbers.
     """
     try:
         text = read_text(path, limit=MAX_TEXT_BYTES)
@@ -61,7 +61,7 @@ def read_scene(path: Path) -> tuple[list[SceneBody], list[str]]:
     try:
         return _of_text(text.split("\n"), path.name)
     except (StopIteration, ValueError, IndexError, RuntimeError):
-        raise CellError(f"{path}: not a MoveIt scene, or cut short") from None
+        raise CellError(f"{path}: not a MoveIt scene, or truncated") from None
 
 
 def _of_text(lines: list[str], label: str) -> tuple[list[SceneBody], list[str]]:

@@ -188,7 +188,7 @@ class Resolver:
             )
         if not within:
             raise NotFoundError(
-                f"{reference!r}: leads out of {root}; "
+                f"{reference!r}: points outside {root}; "
                 "add its folder to resources.packages"
             )
         return _existing(reference, within)
@@ -231,7 +231,7 @@ class Resolver:
             for text in dict.fromkeys((unquote(rest), rest)):
                 path = _normal(folder / text)
                 if not path.is_relative_to(_normal(folder)):
-                    raise NotFoundError(f"{reference!r}: leads out of the package")
+                    raise NotFoundError(f"{reference!r}: points outside the package")
                 candidates.setdefault(path, folder)
         found = _existing(reference, list(candidates))
         return found, _normal(candidates[found])

@@ -74,6 +74,6 @@ def _refuse_xacro(text: str, path: Path) -> None:
             found.insert(0, f"<{element.tag}>")
         if found:
             raise CellError(
-                f"{path}: has {found[0]}, which is to be expanded; name the file "
+                f"{path}: has {found[0]}, which xacro must expand; rename the file to "
                 f"{path.name}.xacro"
             )

@@ -86,7 +86,7 @@ def parse_srdf(text: str, label: str, robot: UrdfDescription) -> SrdfDescription
     named = {link for rows in found.values() for row in rows for link in row}
     unknown = sorted(named - set(robot.links))
     shown = ", ".join(unknown[:10]) + (", …" if len(unknown) > 10 else "")
-    note = f"{label}: collisions of links that the URDF lacks, passed over: {shown}"
+    note = f"{label}: ignored, collisions of links not in the URDF: {shown}"
     return SrdfDescription(
         groups=groups,
         states=states,

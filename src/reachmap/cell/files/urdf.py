@@ -242,7 +242,7 @@ def _with_leaders(joints: list[UrdfJoint], notes: list[str]) -> list[UrdfJoint]:
     stray = {j.name for j in joints if j.mimics is not None and j.mimics not in leaders}
     notes += [
         f"joint {joint.name!r} mimics {joint.mimics!r}, which is not a moving joint; "
-        "it is taken for a joint of its own"
+        "it is treated as an independent joint"
         for joint in joints
         if joint.name in stray
     ]

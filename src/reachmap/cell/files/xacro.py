@@ -115,7 +115,7 @@ def _reason(answer: Mapping[str, str]) -> str:
         )
     return answer.get("error") or (
         f"it was stopped after {LIMIT_CPU_S} s of computing or "
-        f"{LIMIT_BYTES / 1e9:g} GB; is there an expression that does not end?"
+        f"{LIMIT_BYTES / 1e9:g} GB; does one of its macros or includes recurse?"
     )
 
 

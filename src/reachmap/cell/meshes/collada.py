@@ -160,7 +160,7 @@ def _by_three(lists: Lists, sizes: list[int]) -> list[list[int]]:
 def _by_count(lists: Lists, sizes: list[int]) -> list[list[int]]:
     corners = np.concatenate(lists) if lists else np.empty(0, np.int64)
     if min(sizes, default=0) < 0 or sum(sizes) > len(corners):
-        raise MeshError("<polylist> is cut short")
+        raise MeshError("<polylist> is truncated")
     ends = np.cumsum(sizes, dtype=np.int64)
     return [list(corners[e - n : e]) for n, e in zip(sizes, ends, strict=True)]
 

@@ -1,4 +1,4 @@
-"""Triangles of PLY files, text or binary, with whatever else they hold passed over."""
+"""Triangles of PLY files, text or binary; anything else they hold is ignored."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def ply_triangles(data: bytes) -> tuple[FloatArray, IntArray]:
     Raises
     ------
     MeshError, ValueError
-        The file is no PLY file or cut short.
+        The file is not a PLY file, or truncated.
     """
     head, marker, body = data.partition(b"end_header")
     lines = [line.split() for line in head.decode("ascii", "replace").splitlines()]
@@ -135,7 +135,7 @@ class _Binary:
     def _take(self, dtype: np.dtype[Any], count: int) -> npt.NDArray[Any]:
         end = self._at + dtype.itemsize * count
         if count < 0 or end > len(self._body):
-            raise MeshError("the PLY file is cut short")
+            raise MeshError("the PLY file is truncated")
         values = np.frombuffer(self._body, dtype, count=count, offset=self._at)
         self._at = end
         return values
@@ -168,7 +168,7 @@ class _Text:
     def _take(self, count: int) -> list[bytes]:
         words = self._words[self._at : self._at + count]
         if count < 0 or len(words) < count:
-            raise MeshError("the PLY file is cut short")
+            raise MeshError("the PLY file is truncated")
         self._at += count
         return words
 

@@ -45,7 +45,7 @@ def read_mesh(data: bytes, suffix: str) -> TriangleMesh:
     Raises
     ------
     MeshError
-        The file has no triangles, is cut short, names vertices that it does not have,
+        The file has no triangles, is truncated, names vertices that it does not have,
         or holds numbers that are not finite.
     """
     readers: dict[str, Callable[[bytes], tuple[FloatArray, IntArray]]] = {
@@ -102,13 +102,13 @@ def _stl_triangles(data: bytes) -> tuple[FloatArray, IntArray]:
     elif data.lstrip()[:5].lower() == b"solid":
         corners = _numbers(_STL_VERTEX.findall(data))
         if not len(corners) and b"endsolid" not in data.lower():
-            raise MeshError("the STL file is cut short")
+            raise MeshError("the STL file is truncated")
         if len(corners) % 3:
-            raise MeshError("the STL file is cut short: a facet lacks a vertex")
+            raise MeshError("the STL file is truncated: a facet lacks a vertex")
     elif len(data) >= 84 and not count:
         raise MeshError("the mesh has no triangles")
     else:
-        raise MeshError("the STL file is cut short")
+        raise MeshError("the STL file is truncated")
     return corners, np.arange(len(corners)).reshape(-1, 3)
 
 

@@ -94,13 +94,13 @@ class CollisionSpec(Record):
 class Cell(Record):
     """A robot cell with everything needed to scan it."""
 
-    format: Literal["reachmap.cell"] = Field(description="Marks a cell file.")
+    format: Literal["reachmap.cell"] = Field(description="Identifies a cell file.")
     format_version: str = Field(
         pattern=r"^1\.[0-9]{1,6}$",
         description='Version of the format, in quotes: "1.0".',
     )
     name: Identifier = Field(description="Name of the cell.")
-    description: str = Field("", max_length=2000, description="One line for people.")
+    description: str = Field("", max_length=2000, description="One-line description.")
     parameters: Parameters = Field(
         {},
         max_length=100,
@@ -109,19 +109,19 @@ class Cell(Record):
     )
     expressions: dict[str, str] = Field(
         {},
-        description="Written by reachmap into resolved cells: the expressions, by the "
-        "place of the number they stand for.",
+        description="Written by reachmap into resolved cells: expressions by the key "
+        "of the number they determine.",
     )
-    resources: Resources = Field(Resources(), description="Where files are looked up.")
+    resources: Resources = Field(Resources(), description="Where to find files.")
     robot: RobotSpec = Field(description="The arm.")
-    tool: ToolSpec = Field(ToolSpec(), description="How the tool may be turned.")
+    tool: ToolSpec = Field(ToolSpec(), description="Rolls that the tool allows.")
     camera: CameraSpec | None = Field(
         None, description="The 3D camera, if there is one."
     )
     bodies: tuple[BodySpec, ...] = Field(
         (), max_length=1000, description="Everything solid that is not in the URDF."
     )
-    bin: BinSpec = Field(description="The bin that is picked from.")
+    bin: BinSpec = Field(description="The bin to pick from.")
     bins: dict[Identifier, BinSpec] = Field(
         {},
         max_length=20,
@@ -130,11 +130,11 @@ class Cell(Record):
     )
     pick_from: Identifier | None = Field(
         None,
-        description="The one of bins that scans are about, which --bin changes; "
-        "default: the first.",
+        description="Which of the bins to scan (overridden by --bin); default: the "
+        "first.",
     )
     scan_configuration: ScanConfiguration = Field(
-        description="Where the arm images the bin, and every path starts."
+        description="Where the camera images the bin and every path starts."
     )
     collision: CollisionSpec = Field(
         CollisionSpec(), description="Resolution of collision checking."
@@ -143,26 +143,27 @@ class Cell(Record):
     bin_scan: BinScanSpec = Field(BinScanSpec(), description="The bin scan.")
     planner: PlannerSpec = Field(PlannerSpec(), description="The planner.")
     roadmap: RoadmapSpec = Field(
-        RoadmapSpec(), description="How frames are connected, and on what evidence not."
+        RoadmapSpec(), description="Search effort for connecting frames."
     )
     placement: PlacementSpec = Field(
-        PlacementSpec(), description="Limits that place-bin keeps to."
+        PlacementSpec(), description="Where place-bin may put the bin."
     )
     part: PartChoice | None = Field(
         None,
-        description="What is picked; with it the bin scan continues after the grasp. A "
-        "name takes one of parts.",
+        description="The part to pick, or the name of one of parts; with it the bin "
+        "scan continues after the grasp.",
     )
     parts: dict[Identifier, PartSpec] = Field(
         {},
         max_length=100,
-        description="Several parts by name; the first, unless part names another.",
+        description="Several parts by name; the first is picked unless part names "
+        "another.",
     )
     lift: LiftSpec = Field(LiftSpec(), description="How the part leaves the bin.")
     drop_off: DropOffs | None = Field(
-        None, description="Where the part goes: one place, or a list of them."
+        None, description="Where to put the part: one place, or a list of them."
     )
-    cycle: CycleSpec = Field(CycleSpec(), description="Waits, and the way back.")
+    cycle: CycleSpec = Field(CycleSpec(), description="Dwell times and return.")
     seed: int = Field(1, ge=0, lt=2**63, description="Seed of everything random.")
 
     @model_validator(mode="after")
@@ -217,7 +218,7 @@ class Cell(Record):
 
     @property
     def bin_key(self) -> str:
-        """Where a cell file has the bin that is picked from."""
+        """Key of the bin to pick from in the cell file."""
         return "bin" if self.bin.name is None else f"bins.{self.bin.name}"
 
     def T_base_grid(self) -> FloatArray:  # noqa: N802

@@ -30,8 +30,8 @@ class PartSpec(Record):
     pose: PoseSpec = Field(PoseSpec(), description="Shape centre in the TCP frame.")
     yaw: Literal["fixed", "free"] = Field(
         "fixed",
-        description="free: the part's turn about the approach axis is unknown, and the "
-        "body that it sweeps in a turn is carried.",
+        description="free: the part's rotation about the approach axis is unknown, so "
+        "the volume swept by a full turn is carried.",
     )
     mass_kg: Positive | None = Field(None, description="Mass [kg]; informative.")
     touch: tuple[Name, ...] = Field((), description="Links and bodies it may touch.")
@@ -69,13 +69,13 @@ class LiftSpec(Record):
     )
     contact_allowance_m: Depth = Field(
         0.002,
-        description="How deep the part may start in the bottom, and how far it may "
-        "shift sideways in the place that its neighbours leave it [m].",
+        description="Depth to which the part may start in the bottom, and distance it "
+        "may shift sideways between its neighbours [m].",
     )
     contact_distance_m: Depth = Field(
         0.005,
-        description="Way of the lift after which the part must have left the bottom "
-        "[m]; a wall may never be touched.",
+        description="Height of the lift at which the part must be clear of the bottom "
+        "[m]; walls may never be touched.",
     )
 
 
@@ -132,15 +132,15 @@ class DropOffSpec(JointValues):
     )
     free_about: Symmetry = Field(
         1,
-        description="z: any turn about the z axis of pose will do; a number n: turns "
-        "by 1/n about it.",
+        description="z: any rotation about the z axis of pose is allowed; a number n: "
+        "n-fold symmetry about it.",
     )
     approach_distance_m: Depth = Field(
-        0.05, description="Straight way of the part to the place [m]."
+        0.05, description="Straight approach of the part to its place [m]."
     )
     retreat_distance_m: Depth | None = Field(
         None,
-        description="Straight way back of the tool [m]; default: that of the approach.",
+        description="Straight retreat of the tool [m]; default: as the approach.",
     )
 
     @classmethod
@@ -150,12 +150,12 @@ class DropOffSpec(JointValues):
 
     @property
     def retreat_m(self) -> float:
-        """Length of the straight way back [m]."""
+        """Length of the straight retreat [m]."""
         given = self.retreat_distance_m
         return self.approach_distance_m if given is None else given
 
     def turns(self, most: int) -> int:
-        """Turns about z that are tried, evenly spread; ``most`` where any will do."""
+        """Rotations about z to try, evenly spaced; ``most`` where any is allowed."""
         return most if isinstance(self.free_about, str) else self.free_about
 
 
@@ -173,18 +173,18 @@ DropOffs = Annotated[
 
 
 class CycleSpec(Record):
-    """What the cycle takes beside motion, and where it ends."""
+    """Dwell times of the cycle, and where it ends."""
 
     image_s: NonNegative = Field(
         0.0, description="From the arm's standstill until grasps are known [s]."
     )
-    grasp_s: NonNegative = Field(0.0, description="Until the part is held [s].")
-    release_s: NonNegative = Field(0.0, description="Until it is released [s].")
-    io_s: NonNegative = Field(0.0, description="Signals and the like, in all [s].")
+    grasp_s: NonNegative = Field(0.0, description="To grip the part [s].")
+    release_s: NonNegative = Field(0.0, description="To release it [s].")
+    io_s: NonNegative = Field(0.0, description="Signals and other delays [s].")
     capture_overlaps_place: bool = Field(
         False,
-        description="The camera stands still and takes its picture while the part is "
-        "put down: the image costs only what place, retreat and return leave of it.",
+        description="The camera is stationary and takes its image while the part is "
+        "put down: only the time beyond place, retreat and return counts.",
     )
     return_to: JointValues | None = Field(
         None,
@@ -194,5 +194,5 @@ class CycleSpec(Record):
 
     @property
     def waits_s(self) -> float:
-        """All waits but the image [s]."""
+        """All dwell times except that of the image [s]."""
         return self.grasp_s + self.release_s + self.io_s

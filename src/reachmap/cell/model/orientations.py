@@ -53,7 +53,7 @@ class ConeFamily(Record):
     family: Literal["cone"] = Field("cone", description="Cones about straight down.")
     reference: Reference = Field(
         "world",
-        description="Whose vertical counts. world: azimuths are counted from the "
+        description="Which vertical to use. world: azimuths are counted from the "
         "horizontal direction of robot_base's x (workspace scan) or the bin's.",
     )
     tilts_deg: tuple[Tilt, ...] = Field(

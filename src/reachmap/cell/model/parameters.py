@@ -13,7 +13,7 @@ class Parameter(Record):
     """A number with a name, to be varied as one."""
 
     value: Finite = Field(description="Its value, or an expression of others.")
-    unit: str = Field("", max_length=20, description="As in m, deg; for people.")
+    unit: str = Field("", max_length=20, description="Unit, such as m or deg.")
     range: tuple[Finite, Finite] | None = Field(
         None, description="Lowest and highest sensible value."
     )

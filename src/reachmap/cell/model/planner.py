@@ -45,8 +45,8 @@ class PlannerSpec(GrowingRecord):
     )
     straight_first: bool = Field(
         True,
-        description="Try the straight motion to the nearest goal before searching: "
-        "free, it is the shortest path there is.",
+        description="Try the straight motion to the nearest goal before searching: if "
+        "it is free, no path is shorter.",
     )
     restart_checks: int | None = Field(
         150,

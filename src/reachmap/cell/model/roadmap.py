@@ -20,7 +20,7 @@ class RoadmapSpec(Record):
         ("LBKPIECE1", "RRTConnect"),
         min_length=1,
         max_length=8,
-        description="OMPL planners, in turns: what one misses another finds.",
+        description="OMPL planners, in turn: what one misses another may find.",
     )
     max_checks: Checks = Field(
         20000, description="State checks of each planner for a component."
@@ -32,11 +32,11 @@ class RoadmapSpec(Record):
         1.0, description="Cells that guide a KPIECE planner [rad]."
     )
     goals_per_plan: Few = Field(
-        16, description="Goals of a plan, spread over what is open."
+        16, description="Goals of a plan, spread over the open frames."
     )
     starts_per_plan: Few = Field(
         4,
-        description="Configurations a plan may begin at: the scan configuration, and "
+        description="Configurations a plan may start from: the scan configuration, and "
         "reached ones near its goals.",
     )
     samples: int = Field(
@@ -54,7 +54,7 @@ class RoadmapSpec(Record):
     sample_neighbours: Few = Field(
         14, description="Neighbours of a configuration of the lazy roadmap."
     )
-    neighbours: Few = Field(8, description="Neighbours that a goal may be joined to.")
+    neighbours: Few = Field(8, description="Neighbours a goal may be connected to.")
     start_neighbours: Few = Field(
         64, description="Neighbours of the scan configuration."
     )
@@ -66,15 +66,15 @@ class RoadmapSpec(Record):
     )
 
     route_goals: Few = Field(
-        24, description="Goals, spread over what is reached, of the network of routes."
+        24, description="Goals of the network of routes, spread over those reached."
     )
     route_plans: int = Field(
         36, ge=0, le=1000, description="Plans that add routes to the network."
     )
     route_rounds: int = Field(
-        2, ge=0, le=20, description="Times its routes are joined and shortened."
+        2, ge=0, le=20, description="Rounds of joining and shortening its routes."
     )
-    ways: Few = Field(3, description="Ways to a goal of which the shortest is kept.")
+    ways: Few = Field(3, description="Paths to a goal of which the shortest is kept.")
     way_tries: Few = Field(
         100, description="Motions tried from the network to the goals of a frame."
     )

@@ -107,7 +107,7 @@ class MountSpec(Record):
         0.0, description="Turn about the vertical; a wall faces this way [deg]."
     )
     tilt_deg: Angle = Field(
-        0.0, description="Lean beside that of the kind, towards the yaw [deg]."
+        0.0, description="Tilt in addition to that of the kind, towards the yaw [deg]."
     )
     size: tuple[Length, Length] | None = Field(
         None, description="Sides of the body across the base [m]; null: no body."

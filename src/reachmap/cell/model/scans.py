@@ -131,8 +131,8 @@ class BinScanSpec(Record):
     )
     press_in_m: Height = Field(
         PRESS_IN_M,
-        description="The obstacle ends this far below its level: what a cup may press "
-        "in, and a tilted tool may dip below its tip [m].",
+        description="The obstacle ends this far below its level: a cup may press in, "
+        "and a tilted tool dip below its tip, by this much [m].",
     )
     orientations: OrientationFamily = Field(
         ConeFamily(), description="Tool orientations tried at every point."
@@ -143,21 +143,21 @@ class BinScanSpec(Record):
     attempts: Literal["roadmap", "planner"] = Field(
         "roadmap",
         description="roadmap: paths branch off a shared network of routes; planner: "
-        "the planner searches for each from scratch, as in the paper.",
+        "the planner searches for each path from scratch, as in the paper.",
     )
     refine: int = Field(
         2000,
         ge=0,
         le=10_000,
-        description="Grasps between the test grasps whose verdict alone is found, "
-        "drawn where it is in doubt; at most as many as there are test grasps, and "
-        "only where the roll is free. 0: none.",
+        description="Number of grasps between the test grasps that get only a verdict, "
+        "drawn where it is uncertain; at most the number of test grasps, and only "
+        "where the roll is free. 0: none.",
     )
     approach_distance_m: Approach = Field(
         0.0,
         description="Straight approach before the grasp [m]; 0 plans to the pose; "
         "clear_rim: as long as the deepest and most tilted grasp needs for its "
-        "approach to begin above the rim.",
+        "approach to start above the rim.",
     )
 
     @property
@@ -209,8 +209,8 @@ class PlacementSpec(Record):
     )
     tolerance: ToleranceSpec = Field(
         ToleranceSpec(),
-        description="What the worst case of a pose is taken over; 0 and 0: the pose "
-        "itself.",
+        description="Errors of the pose that its worst case is taken over; 0 and 0: "
+        "none.",
     )
     yaw_deg: AngleRange = Field(
         (0.0, 180.0),

@@ -1,4 +1,4 @@
-"""The tool: what turning it about its approach axis changes."""
+"""The tool: its symmetry about the approach axis."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ class ToolSpec(Record):
     roll: Annotated[str, Field(pattern=r"^(listed|free|([2-9]|[1-9][0-9])-fold)$")] = (
         Field(
             LISTED,
-            description="listed: as the orientations say; free: any roll will do, as "
-            "for a suction cup; N-fold, as in 2-fold: the tool looks the same after a "
-            "part of a turn.",
+            description="listed: the rolls of the orientations; free: any roll, as for "
+            "a suction cup; N-fold, such as 2-fold: the tool is symmetric under 1/N of "
+            "a turn.",
         )
     )
     rolls: int = Field(
-        24, ge=2, le=360, description="Rolls of a direction that are tried where free."
+        24, ge=2, le=360, description="Rolls tried per direction where roll is free."
     )
 
     def count(self) -> int:
-        """Rolls of one direction that will do, evenly spread over a turn."""
+        """Equivalent rolls per direction, evenly spaced over a turn."""
         if self.roll == LISTED:
             return 1
         return self.rolls if self.roll == FREE else int(self.roll.split("-")[0])

@@ -65,7 +65,7 @@ class Evaluator:
             )
         if name in self._open:
             circle = " → ".join([*self._open[self._open.index(name) :], name])
-            raise ExpressionError(f"parameters in a circle: {circle}")
+            raise ExpressionError(f"circular parameters: {circle}")
         if name not in self._known:
             self._open.append(name)
             try:

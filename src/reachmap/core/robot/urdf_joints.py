@@ -71,7 +71,7 @@ def read_urdf_joints(urdf: str) -> UrdfJoints:
     CellError
         The text is no URDF.
     SceneError
-        Joints mimic in a circle.
+        Joints mimic each other in a cycle.
     """
     description = parse_urdf(urdf, "robot.urdf")
     joints = {n: j for n, j in description.joints.items() if j.type in MOVING}
@@ -96,7 +96,7 @@ def _follower(name: str, joints: Mapping[str, UrdfJoint]) -> Follower:
     multiplier, offset, seen = 1.0, 0.0, [name]
     while (joint := joints[seen[-1]]).mimics is not None:
         if joint.mimics in seen:
-            raise ValueError(f"mimics in a circle ({' → '.join(seen)} → …)")
+            raise ValueError(f"circular mimics ({' → '.join(seen)} → …)")
         offset += multiplier * joint.offset
         multiplier *= joint.multiplier
         seen.append(joint.mimics)

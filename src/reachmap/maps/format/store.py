@@ -39,7 +39,7 @@ from reachmap.maps.format.layout import (
 )
 
 OPEN_ELSEWHERE = (
-    "open for writing in another program, or left so by one that crashed; close it "
+    "open for writing in another program, or left open by one that crashed; close it "
     "there and try again"
 )
 MAX_PROBLEMS = 8

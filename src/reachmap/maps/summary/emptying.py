@@ -73,7 +73,7 @@ class Emptying:
             low = 1000.0 * self.levels[0].height_m
             return f"empties to {low:.0f} mm, the lowest level, everywhere"
         share = f"{self.left:.0f}" if self.left >= 1 else f"{self.left:.1f}"
-        rest = f"the last {share} % stay {self.where}"
+        rest = f"the last {share} % remain {self.where}"
         if self.empties_to_m is None:
             return f"no level can be picked everywhere; {rest}"
         return f"empties to {1000.0 * self.empties_to_m:.0f} mm; {rest}"

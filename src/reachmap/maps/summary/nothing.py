@@ -1,4 +1,4 @@
-"""Why nothing is reachable, in one line: the likeliest cause, with counts."""
+"""Why nothing is reachable, in one line: the most likely cause, with counts."""
 
 from __future__ import annotations
 
@@ -11,21 +11,21 @@ from reachmap.maps.records import BinMap, Status, WorkspaceMap
 from reachmap.maps.summary.statistics import STATUS_NAMES, frames_of
 
 REMEDIES = {
-    Status.NO_IK: "the arm does not get there with its tool like that: look at where "
-    "the cubes or the bin are, at robot.tcp and its approach_axis, at the orientations",
-    Status.APPROACH_BLOCKED: "the straight way of bin_scan.approach_distance_m before "
-    "the grasp is not free",
-    Status.NO_PATH_FOUND: "there are free configurations, but no path to them: look at "
-    "the scan configuration, joint limits, and what stands around the arm",
+    Status.NO_IK: "the arm cannot reach these tool poses: check the position of the "
+    "cubes or the bin, robot.tcp and its approach_axis, and the orientations",
+    Status.APPROACH_BLOCKED: "the straight approach of bin_scan.approach_distance_m is "
+    "not free",
+    Status.NO_PATH_FOUND: "there are free configurations, but no path to them: check "
+    "the scan configuration, the joint limits and the obstacles around the arm",
 }
 
 
 def why_nothing(record: WorkspaceMap | BinMap) -> str:
     """Why a map has no reachable test frame; "" where it has one."""
-    return likeliest_cause(*frames_of(record), record.body_pairs)
+    return most_likely_cause(*frames_of(record), record.body_pairs)
 
 
-def likeliest_cause(
+def most_likely_cause(
     status: CodeArray, blocking_pair: IntArray, body_pairs: Sequence[str]
 ) -> str:
     """Say why no test frame was reached; "" where one was, or none attempted.
@@ -52,6 +52,6 @@ def likeliest_cause(
     else:
         remedy = REMEDIES.get(states[0], "see the log")
     return (
-        f"nothing is reachable (of {int(tried.sum())} test frames: {said}); likeliest "
-        f"cause: {STATUS_NAMES[states[0]]}, {remedy}"
+        f"nothing is reachable (of {int(tried.sum())} test frames: {said}); most "
+        f"likely cause: {STATUS_NAMES[states[0]]}, {remedy}"
     )

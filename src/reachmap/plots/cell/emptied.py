@@ -30,7 +30,7 @@ MOST_HEAPS = 3
 WIDTH_IN, GAP_IN, SIDE_IN, FOOT_IN, HEAD_IN = 3.2, 0.35, 0.35, 0.75, 1.15
 KINDS = (
     (Fate.PICKED, "picked", "none", PALE),
-    (Fate.COVERED, "below a part that stays", "#f4b183", "#9c5a1f"),
+    (Fate.COVERED, "below a part that remains", "#f4b183", "#9c5a1f"),
     (Fate.UNREACHABLE, "not reached", "#d1493f", "#7a1d16"),
 )
 
@@ -57,7 +57,7 @@ def draw_emptied(
         axes = axes_at(figure, left, FOOT_IN, WIDTH_IN, height)
         _draw_heap(axes, view, heap, emptied)
         stay = int((emptied.fate != Fate.PICKED).sum())
-        text = f"{stay} of {plural(len(heap), 'part')} stay"
+        text = f"{stay} of {plural(len(heap), 'part')} remain"
         put_text(figure, left, FOOT_IN + height + 0.08, text, color=MUTED)
     figure.legend(
         handles=[

@@ -36,12 +36,12 @@ def draw_robustness(record: Robustness) -> Figure:
         color=BIN_COLOUR,
         alpha=0.18,
         linewidth=0,
-        label=f"least and most of {summary.samples} cells",
+        label=f"minimum to maximum of {summary.samples} cells",
     )
     lines = (
         ("reachability", "stay reachable, mean", BIN_COLOUR, "o", "-"),
         ("always", "stay reachable in every cell", "#7b1fa2", "s", "--"),
-        ("certified", "certified: no such error ends them", INK, "^", ":"),
+        ("certified", "certified: no such error causes a collision", INK, "^", ":"),
     )
     for name, words, colour, marker, style in lines:
         axes.plot(

@@ -155,7 +155,7 @@ def margin_envelope(
     if not corners:
         return ()
     points = np.concatenate(corners)
-    return (hull_outline("where it may be off to (margin)", "envelope", points),)
+    return (hull_outline("margin", "envelope", points),)
 
 
 def _moved(T: FloatArray, points: FloatArray) -> FloatArray:

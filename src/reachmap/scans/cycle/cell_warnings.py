@@ -33,7 +33,7 @@ def drop_off_warnings(scenes: CycleScenes) -> list[str]:
     for spec in loaded.cell.drop_offs:
         ways, pair = ways_to_place(scenes, spec)
         if not ways:
-            cause = pair or "out of reach, or the straight way leads out of it"
+            cause = pair or "out of reach, or the straight approach is"
             warnings.append(
                 f"{loaded.source}: drop_off: nothing can be put down at "
                 f"{spec.name!r} ({cause})"
