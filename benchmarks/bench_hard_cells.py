@@ -39,9 +39,8 @@ from reachmap.core.planning.timing import execution_time_s, path_length_rad
 from reachmap.core.scene import Scene
 from reachmap.runtime.options import RunOptions
 from reachmap.sampling.frames import bin_test_frames
-from reachmap.scans.bin_scan import plan_from_scratch
 from reachmap.scans.ik_survey import Survey, survey_frames
-from reachmap.scans.routes import RouteAttempts, Routes
+from reachmap.scans.routes import RouteAttempts, Routes, plan_from_scratch
 from reachmap.tools.bin_scan import bin_scan
 from reachmap.tools.validate import PickOptions, validate
 

@@ -12,8 +12,8 @@ from reachmap.sampling.frames import (
     bin_test_frames,
     workspace_frames,
 )
-from reachmap.scans.bin_scan import plan_from_scratch
 from reachmap.scans.ik_survey import survey_frames
+from reachmap.scans.routes import plan_from_scratch
 from reachmap.scans.workspace_per_frame import plan_frames
 from reachmap.scans.workspace_roadmap import connect_survey
 from tests.support.dense_checks import dense_free

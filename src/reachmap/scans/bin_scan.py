@@ -13,7 +13,6 @@ import numpy as np
 from reachmap._typing import FloatArray
 from reachmap.cell.model.cell import Cell
 from reachmap.core.collision.held_part import HeldPart
-from reachmap.core.kinematics.windings import Windings
 from reachmap.core.planning.planner import PlanResult
 from reachmap.core.planning.timing import path_length_rad
 from reachmap.core.scene import Scene
@@ -36,9 +35,9 @@ from reachmap.scans.cycle.stages import whole_cycles
 from reachmap.scans.document import journal_settings
 from reachmap.scans.ik_survey import Survey
 from reachmap.scans.margins import MarginMeter
-from reachmap.scans.measured import MEASURED, Meter, attempt_seed
+from reachmap.scans.measured import MEASURED, Meter
 from reachmap.scans.refinement import refine
-from reachmap.scans.routes import RouteAttempts, WayIn
+from reachmap.scans.routes import RouteAttempts, WayIn, plan_from_scratch, ways_in
 
 if TYPE_CHECKING:
     from reachmap.cell.loading import LoadedCell
@@ -231,30 +230,6 @@ def plan_grasps(
     return results
 
 
-def plan_from_scratch(
-    scene: Scene, survey: Survey, grasps: Sequence[int]
-) -> list[list[tuple[PlanResult, int]]]:
-    """Let the cell's planner make all attempts, as in the paper.
-
-    They take turns: a machine that is slow for a moment is then slow for one attempt
-    at each of many, and not for every attempt at one, which would look expensive.
-    """
-    cell, start = scene.loaded.cell, scene.scan_configuration
-    windings = Windings(scene.robot)
-    goals = [
-        survey.goals_near(survey.goals_of(grasp), start, windings) for grasp in grasps
-    ]
-    plans: list[list[tuple[PlanResult, int]]] = [[] for _ in grasps]
-    for repeat in range(cell.bin_scan.repeats):
-        for row, grasp in enumerate(grasps):
-            Q, goal = goals[row]
-            if len(Q):
-                seed = attempt_seed(cell.seed, grasp, repeat)
-                plan = scene.planner.plan(start, Q, seed)
-                plans[row].append((plan, int(goal[plan.goal])))
-    return plans
-
-
 def _results(
     scene: Scene,
     known: BinRoadmap,
@@ -265,30 +240,10 @@ def _results(
     cycle: CyclePlanner | None,
 ) -> GraspResults:
     survey, repeats = known.survey, scene.loaded.cell.bin_scan.repeats
-    measured = np.full((1, repeats, len(MEASURED)), np.nan)
-    numbers_of_own = np.full((1, len(MEASURED)), np.nan)
-    found: list[WayIn] = []
-    meter = Meter(scene)
-    for repeat, (plan, goal) in enumerate(plans):
-        if plan.path is not None:
-            way = survey.way_from(goal, plan.path[-1])
-            measured[0, repeat] = meter.measured(plan, way)
-            found.append(WayIn.of(plan.path, way, repeat, goal))
-    if own is not None:
-        found.append(WayIn.of(own[0], survey.way_from(own[1], own[0][-1]), -1, own[1]))
-    best = min(found, key=lambda way: path_length_rad(way.path), default=None)
+    found = ways_in(survey, plans, own)
     after = None if cycle is None else cycle.plan(grasp, found)
-    if after is not None and after.way_in is not None:
-        # What a line runs is the whole cycle, whichever way in is the shortest.
-        best = after.way_in
-        if best.repeat < 0:
-            found = [*(way for way in found if way.repeat >= 0), best]
-    for way_in in found:
-        if way_in.repeat < 0:
-            path = way_in.path[: way_in.planned]
-            approach = way_in.path[way_in.planned - 1 :]
-            plan = PlanResult.without_search(path)
-            numbers_of_own[0] = meter.measured(plan, approach)
+    found, best = _chosen(found, after)
+    measured, measured_own = _measured(Meter(scene), survey, plans, found, repeats)
     connected = known.routes.over_roadmap(survey, grasp) is not None
     return GraspResults(
         status=np.array([_status(survey, grasp, found=bool(found))], np.uint8),
@@ -300,7 +255,7 @@ def _results(
         hit_time_limit=_per_attempt(plans, "hit_time_limit", repeats, np.uint8),
         checks=_per_attempt(plans, "checks", repeats, np.int64),
         measured=measured,
-        own=numbers_of_own,
+        own=measured_own,
         component=known.component[[grasp]],
         winning_roll=np.array(
             [np.nan if best is None else survey.roll_of(grasp, best.goal)]
@@ -312,6 +267,44 @@ def _results(
         best_repeat=np.array([NO_PATH if best is None else best.repeat], np.int64),
         cycle=None if after is None else CycleResults.of([after]),
     )
+
+
+def _chosen(
+    found: list[WayIn], after: CyclePlan | None
+) -> tuple[list[WayIn], WayIn | None]:
+    """Ways in to keep, and the one that a line would run."""
+    if after is None or after.way_in is None:
+        shortest = min(found, key=lambda way: path_length_rad(way.path), default=None)
+        return found, shortest
+    # What a line runs is the whole cycle, whichever way in is the shortest.
+    best = after.way_in
+    if best.repeat < 0:
+        found = [*(way for way in found if way.repeat >= 0), best]
+    return found, best
+
+
+def _measured(
+    meter: Meter,
+    survey: Survey,
+    plans: Sequence[tuple[PlanResult, int]],
+    found: Sequence[WayIn],
+    repeats: int,
+) -> tuple[FloatArray, FloatArray]:
+    """Numbers of the attempts, (1, repeats, n), and of the roadmap's path, (1, n)."""
+    of_attempts = np.full((1, repeats, len(MEASURED)), np.nan)
+    of_own = np.full((1, len(MEASURED)), np.nan)
+    for repeat, (plan, goal) in enumerate(plans):
+        if plan.path is not None:
+            way = survey.way_from(goal, plan.path[-1])
+            of_attempts[0, repeat] = meter.measured(plan, way)
+    for way_in in found:
+        if way_in.repeat < 0:
+            path, planned = way_in.path, way_in.planned
+            approach = path[planned - 1 :]
+            of_own[0] = meter.measured(
+                PlanResult.without_search(path[:planned]), approach
+            )
+    return of_attempts, of_own
 
 
 def _kept_paths(

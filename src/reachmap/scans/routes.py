@@ -1,4 +1,4 @@
-"""Attempts at test grasps that branch off a shared network of routes."""
+"""Attempts at test grasps: over a shared network of routes, or each from scratch."""
 
 from __future__ import annotations
 
@@ -222,3 +222,53 @@ class RouteAttempts:
             shorten_until(way, motions, rng, cell.roadmap.least_gain) for way in ways
         ]
         return min(short, key=path_length_rad)
+
+
+def plan_from_scratch(
+    scene: Scene, survey: Survey, grasps: Sequence[int]
+) -> list[list[tuple[PlanResult, int]]]:
+    """Let the cell's planner make all attempts, as in the paper.
+
+    They take turns: a machine that is slow for a moment is then slow for one attempt
+    at each of many, and not for every attempt at one, which would look expensive.
+    """
+    cell, start = scene.loaded.cell, scene.scan_configuration
+    windings = Windings(scene.robot)
+    goals = [
+        survey.goals_near(survey.goals_of(grasp), start, windings) for grasp in grasps
+    ]
+    plans: list[list[tuple[PlanResult, int]]] = [[] for _ in grasps]
+    for repeat in range(cell.bin_scan.repeats):
+        for row, grasp in enumerate(grasps):
+            Q, goal = goals[row]
+            if len(Q):
+                seed = attempt_seed(cell.seed, grasp, repeat)
+                plan = scene.planner.plan(start, Q, seed)
+                plans[row].append((plan, int(goal[plan.goal])))
+    return plans
+
+
+def ways_in(
+    survey: Survey,
+    plans: Sequence[tuple[PlanResult, int]],
+    own: tuple[FloatArray, int] | None,
+) -> list[WayIn]:
+    """Paths of the attempts that found one, and the roadmap's own, to a test grasp.
+
+    Parameters
+    ----------
+    survey : Survey
+    plans : sequence of (PlanResult, int)
+        Attempts, each with the goal it ends at.
+    own : (array of shape (n, dof), int) or None
+        The roadmap's path and its goal, where it is wanted.
+    """
+    found = [
+        WayIn.of(plan.path, survey.way_from(goal, plan.path[-1]), repeat, goal)
+        for repeat, (plan, goal) in enumerate(plans)
+        if plan.path is not None
+    ]
+    if own is not None:
+        path, goal = own
+        found.append(WayIn.of(path, survey.way_from(goal, path[-1]), -1, goal))
+    return found
