@@ -12,7 +12,7 @@ from reachmap.cell.loading import LoadedCell, read_cell
 from reachmap.core import trace
 from reachmap.core.memo import Memo, fingerprint, remembered
 from reachmap.core.scene import Scene
-from reachmap.core.trace import Trace
+from reachmap.core.trace import EVERY, FREE, Trace
 from reachmap.tools import variant
 from tests.studies.test_study import HEIGHT, RADIUS, SMALL
 
@@ -113,6 +113,31 @@ def test_answers_are_asked_again_near_what_changed() -> None:
     # A body that is in the way nowhere gives what another one like it has given.
     assert memo.computed >= len(truth) > 1
     assert memo.found + memo.computed == 12
+
+
+def test_one_body_is_asked_about_by_itself() -> None:
+    """For many configurations at once: what is in the way is what single checks name.
+
+    Rung by rung, the bodies of the world come to what a check of all pairs says.
+    """
+    checker = Scene.build(read_cell("ur5-eye-in-hand"), with_bin=False).checker
+    robot = checker.robot
+    Q = np.random.default_rng(4).uniform(robot.lower_rad, robot.upper_rad, (300, 6))
+    named = [{checker.body_pairs[k] for k in checker.touching_pairs(q)} for q in Q]
+    for name in ("pedestal", "floor", "back structure"):
+        expected = [any(name in pair.split(" | ") for pair in pairs) for pairs in named]
+        assert 0 < sum(expected) < len(Q)
+        assert checker.touched_mask(FREE, Q, name, EVERY).tolist() == expected
+        moving = range(len(checker.bound.on_chain))
+        for about in (FREE, 0, 4):
+            each = [
+                checker.touched_mask(about, Q, name, body)
+                for body in checker.bodies_against(name) or moving
+            ]
+            together = checker.touched_mask(about, Q, name, EVERY)
+            assert np.array_equal(np.any(each, axis=0), together)
+            clear = np.array([checker.asked(about, q) for q in Q])
+            assert not (together & clear).any()
 
 
 def test_questions_to_another_checker_are_not_taken_over() -> None:

@@ -11,7 +11,6 @@ before; so units of work may be done in any order and process.
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Collection, Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -20,12 +19,13 @@ import numpy as np
 import pinocchio as pin
 
 from reachmap._typing import BoolArray, FloatArray, IntArray
+from reachmap.core.bystander import Bystander, guess_nothing
 from reachmap.core.collision.bodies import BodyGeometry
 from reachmap.core.collision.displacement import MotionBound
 from reachmap.core.collision.never_meet import PairMotion, pairs_that_never_meet
 from reachmap.core.collision.shapes import convex_hull
 from reachmap.core.robot.chain import SerialChain
-from reachmap.core.trace import FREE, TOUCHING, Trace
+from reachmap.core.trace import EVERY, FREE, TOUCHING, Trace
 
 if TYPE_CHECKING:
     from reachmap.core.robot.model import RobotModel
@@ -119,22 +119,23 @@ class CollisionChecker:
         # keep the distance that the camera needs from the floor.
         self._shares = (self.pair_reach_m / self.reach_m).max(axis=1, initial=0.0)
         self.checks = 0
+        self._bystanders: dict[tuple[int, str, int], Bystander] = {}
         self._start_engine()
 
     def _start_engine(self) -> None:
         self._data = self._model.createData()
         self._broadphase, self._base = self._broadphase_with(
-            self.bodies, np.full(len(self._pair_names), self.safety_margin_m)
+            self.bodies, self._pair_margins_m(FREE)
         )
         self._ladder = [
-            (
-                step,
-                *self._broadphase_with(
-                    self.hulls, self.safety_margin_m + step * self._shares
-                ),
-            )
-            for step in LADDER_M
+            (step, *self._broadphase_with(self.hulls, self._pair_margins_m(rung)))
+            for rung, step in enumerate(LADDER_M)
         ]
+
+    def _pair_margins_m(self, about: int) -> FloatArray:
+        if about == FREE:
+            return np.full(len(self._pair_names), self.safety_margin_m)
+        return np.asarray(self.safety_margin_m + LADDER_M[about] * self._shares)
 
     def move(
         self,
@@ -152,6 +153,8 @@ class CollisionChecker:
                 body.placement = placement
                 if shapes and name in shapes:
                     body.geometry = shapes[name]
+        for key in [key for key in self._bystanders if key[1] in T_root_body]:
+            del self._bystanders[key]
         self._start_engine()
 
     def _broadphase_with(self, geometry: Any, margins: FloatArray) -> tuple[Any, Any]:
@@ -211,6 +214,47 @@ class CollisionChecker:
             return self.touching_pairs(q)
         return self.is_free(q) if about == FREE else self._is_clear_at(about, q)
 
+    def touched_mask(
+        self, about: int, Q: FloatArray, name: str, body: int
+    ) -> BoolArray:
+        """Whether a body that stands still touches a moving one, (n, dof) to (n,).
+
+        Parameters
+        ----------
+        about : int
+            FREE or a rung of the ladder.
+        Q : array, shape (n, dof)
+        name : str
+            Of the body that stands still.
+        body : int
+            The moving one, as :meth:`bodies_against` counts; EVERY for all of them.
+        """
+        key = about, name, body
+        if key not in self._bystanders:
+            pairs = self._pairs_of(name, body)
+            self._bystanders[key] = Bystander(
+                self._model,
+                self.bodies if about == FREE else self.hulls,
+                pairs,
+                self._pair_margins_m(about)[pairs],
+            )
+        robot = self.robot
+        if len(robot.following):
+            Q = np.array([robot.body_configuration(q) for q in Q])
+        return self._bystanders[key].touched(Q)
+
+    def _pairs_of(self, name: str, body: int = EVERY) -> IntArray:
+        moving = None if body == EVERY else int(self.bound.on_chain[body])
+        found = [
+            k
+            for k, (pair, names) in enumerate(
+                zip(self.bodies.collisionPairs, self._pair_names, strict=True)
+            )
+            if name in names.split(" | ")
+            and (moving is None or moving in (pair.first, pair.second))
+        ]
+        return np.array(found, np.int64)
+
     def margins_m(self, about: IntArray) -> FloatArray:
         """How near a body has to be to one that stands still to matter.
 
@@ -238,13 +282,8 @@ class CollisionChecker:
         Counted among those that the chain moves; None where there are others.
         """
         number = {int(body): k for k, body in enumerate(self.bound.on_chain)}
-        found = {
-            number.get(pair.first, number.get(pair.second, -1))
-            for pair, names in zip(
-                self.bodies.collisionPairs, self._pair_names, strict=True
-            )
-            if name in names.split(" | ")
-        }
+        pairs = [self.bodies.collisionPairs[int(k)] for k in self._pairs_of(name)]
+        found = {number.get(p.first, number.get(p.second, -1)) for p in pairs}
         return None if -1 in found else tuple(sorted(found))
 
     def free_mask(self, Q: FloatArray) -> BoolArray:
@@ -281,19 +320,6 @@ class CollisionChecker:
         """
         candidates = [pairs for q in Q if (pairs := self.touching_pairs(q))]
         return min(candidates, key=len)[0] if candidates else _NO_PAIR
-
-
-def guess_nothing(requests: Any) -> None:
-    """Let checks begin from nothing that an earlier one has left.
-
-    Its guess would change answers in the last digits, and saves no time that could be
-    measured.
-    """
-    with warnings.catch_warnings():
-        # The setting that coal has in its place acts beside this one, not instead.
-        warnings.simplefilter("ignore", DeprecationWarning)
-        for request in requests:
-            request.enable_cached_gjk_guess = False
 
 
 def _with_convex_hulls(geometry: Any) -> Any:

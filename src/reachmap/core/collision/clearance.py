@@ -9,7 +9,8 @@ import numpy as np
 import pinocchio as pin
 
 from reachmap._typing import BoolArray, FloatArray, IntArray
-from reachmap.core.collision.checker import CollisionChecker, guess_nothing
+from reachmap.core.bystander import guess_nothing
+from reachmap.core.collision.checker import CollisionChecker
 from reachmap.core.trace import Trace
 from reachmap.geometry import pieces
 
