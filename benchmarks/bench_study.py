@@ -40,12 +40,20 @@ from reachmap.tools.variant import (
 )
 
 CELL = "ur5-eye-in-hand"
+# Small enough that thirty variants and the separate runs beside them take minutes.
 GRID = (
-    "workspace_scan.cubes.0.grid=[4,2]",
-    "workspace_scan.cubes.1.grid=[4,2]",
-    "workspace_scan.z_step=0.3333333333",
+    "workspace_scan.cubes.0.grid=[3,2]",
+    "workspace_scan.cubes.1.grid=[3,2]",
+    "workspace_scan.z_step=0.5",
+    "workspace_scan.orientations.rolls=1",
     "bin_scan.grid=[3,2]",
     "bin_scan.repeats=1",
+    "bin_scan.orientations.tilts_deg=[0,30]",
+    "bin_scan.orientations.azimuths=[1,8]",
+    "bin_scan.orientations.rolls=[1,1]",
+    "bin_scan.orientations.roll_offset_deg=[180,180]",
+    "roadmap.max_checks=4000",
+    "roadmap.sample_checks=4000",
 )
 TUBE, HEIGHT = "parameters.tube_length={:.4g}", "parameters.pedestal_height={:.4g}"
 WALL = "bodies.back structure.pose.xyz.0={:.4g}"
