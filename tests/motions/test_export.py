@@ -36,7 +36,7 @@ def run(*arguments: object) -> Result:
 
 
 def ways(text: str) -> dict[tuple[str, ...], np.ndarray]:
-    """Way-points of each motion of a CSV file, by test grasp: times first."""
+    """Waypoints of each motion of a CSV file, by test grasp: times first."""
     lines = [line for line in text.splitlines() if not line.startswith("#")]
     rows = list(csv.reader(lines))[1:]
     found: dict[tuple[str, ...], list[list[float]]] = {}

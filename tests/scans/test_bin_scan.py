@@ -73,7 +73,7 @@ def test_paths_lead_from_the_scan_configuration_to_their_test_grasp(ur5_bin):
 
 
 def test_stored_lengths_and_times_are_those_of_the_paths(ur5_bin):
-    """Lengths follow from the stored way-points; times are no shorter than planned."""
+    """Lengths follow from the stored waypoints; times are no shorter than planned."""
     scene = scene_of("ur5-eye-in-hand", *UR5_FEW)
     limits = (scene.robot.velocity_rad_s, scene.robot.acceleration_rad_s2)
     for path, planned, index in paths_of(ur5_bin):

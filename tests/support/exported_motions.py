@@ -16,7 +16,7 @@ Reader = Callable[[str], list[FloatArray]]
 
 
 def from_csv(text: str) -> list[FloatArray]:
-    """Way-points of each motion, (n, dof) each."""
+    """Waypoints of each motion, (n, dof) each."""
     lines = [line for line in text.splitlines() if not line.startswith("#")]
     motions: dict[tuple[str, ...], list[list[float]]] = {}
     for row in list(csv.reader(lines))[1:]:
@@ -25,7 +25,7 @@ def from_csv(text: str) -> list[FloatArray]:
 
 
 def from_json(text: str) -> list[FloatArray]:
-    """Way-points of each motion."""
+    """Waypoints of each motion."""
     return [np.array(one["configuration"]) for one in json.loads(text)["motions"]]
 
 

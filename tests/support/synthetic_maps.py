@@ -275,7 +275,7 @@ def synthetic_bin_map(
 
 
 def synthetic_paths(found: np.ndarray, rng: np.random.Generator) -> PathStore:
-    """A path of two to five way-points for every attempt that found one."""
+    """A path of two to five waypoints for every attempt that found one."""
     index = np.argwhere(found).astype(np.int32)
     planned = rng.integers(2, 5, len(index)).astype(np.int32)
     rows = planned + 1

@@ -70,7 +70,7 @@ def test_a_playback_goes_from_the_scan_to_the_grasp_and_out(
 
 
 def test_a_playback_stays_on_the_path(playbacks: list[Playback]) -> None:
-    """Every way-point of the planned part is passed, none is cut off."""
+    """Every waypoint of the planned part is passed, none is cut off."""
     record = toy_bin_map()
     for row, playback in enumerate(playbacks):
         planned, _ = way_points(record, row)

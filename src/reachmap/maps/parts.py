@@ -27,9 +27,9 @@ class PathStore:
     Attributes
     ----------
     configuration : array, shape (points, dof)
-        Way-points of all paths, one after another [rad].
+        Waypoints of all paths, one after another [rad].
     row_size : int array, shape (paths,)
-        Number of way-points of each path.
+        Number of waypoints of each path.
     planned_size : int array, shape (paths,)
         How many of them, from the first, are the planned part; the rest is the
         straight approach.
@@ -53,7 +53,7 @@ class PathStore:
         return len(self.row_size)
 
     def __getitem__(self, row: int) -> FloatArray:
-        """Way-points of one path, shape (n, dof) [rad]."""
+        """Waypoints of one path, shape (n, dof) [rad]."""
         if not -len(self) <= row < len(self):
             raise IndexError(f"there are {len(self)} paths (got {row})")
         row %= len(self)

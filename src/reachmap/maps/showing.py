@@ -94,7 +94,7 @@ class ShownBin(Shown):
         paths: PathStore
 
     def path(self, row: int) -> FloatArray:
-        """Way-points of a stored path, a row of ``paths``, shape (n, dof) [rad]."""
+        """Waypoints of a stored path, a row of ``paths``, shape (n, dof) [rad]."""
         return self.paths[row]
 
 

@@ -1,6 +1,6 @@
 """Motions as text: for programs, for ROS, and for the controllers of robots.
 
-Robot languages get joint motions only, one for each way-point and with an exact stop:
+Robot languages get joint motions only, one for each waypoint and with an exact stop:
 a controller moves the joints in proportion between them, which is the straight joint
 motion that was verified. Blending would leave it, and so would a linear motion of the
 tool where the joints turn much; neither is written.
@@ -69,7 +69,7 @@ class Origin:
 
 
 def as_csv(motions: Sequence[Motion], origin: Origin) -> str:
-    """One row a way-point; lines that begin with # say where it comes from."""
+    """One row a waypoint; lines that begin with # say where it comes from."""
     text = io.StringIO()
     text.writelines(f"# {line}\n" for line in origin.lines())
     writer = csv.writer(text, lineterminator="\n")

@@ -72,7 +72,7 @@ class ServedMotion:
     T_base_tcp : array, shape (4, 4)
         Tool pose that the motion ends at.
     planned : array, shape (n, dof)
-        Way-points from the scan configuration to the pre-grasp [rad].
+        Waypoints from the scan configuration to the pre-grasp [rad].
     approach : array, shape (m, dof)
         From the pre-grasp, which is the last of ``planned``, to the grasp [rad].
     verified : bool

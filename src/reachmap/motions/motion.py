@@ -1,4 +1,4 @@
-"""The stored path to a test grasp as a motion: way-points, stages, times."""
+"""The stored path to a test grasp as a motion: waypoints, stages, times."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ class Motion:
     test_grasp : (int, int, int, int)
         Layer, y, x, orientation.
     configuration : array, shape (n, dof)
-        Way-points [rad]; between them the joints move in proportion, which is what
+        Waypoints [rad]; between them the joints move in proportion, which is what
         was verified.
     stage : tuple of str
-        Of the piece that ends at each way-point: ``planned`` or ``approach``.
+        Of the piece that ends at each waypoint: ``planned`` or ``approach``.
     time_s : array, shape (n,)
         When each is reached, within the limits of the joints: at rest at every corner
         of the planned part, without a stop along the straight approach.
@@ -44,7 +44,7 @@ class Motion:
 
     @property
     def pre_grasp(self) -> int:
-        """Way-point at which the straight approach begins."""
+        """Waypoint at which the straight approach begins."""
         return len(self.stage) - self.stage.count(APPROACH) - 1
 
     def sampled(
@@ -73,7 +73,7 @@ class Motion:
         return np.array(times), np.array(positions), np.array(speeds)
 
     def _pieces(self) -> Iterator[tuple[int, int]]:
-        """Way-points between which the arm does not stop."""
+        """Waypoints between which the arm does not stop."""
         for k in range(self.pre_grasp):
             yield k, k + 1
         if self.pre_grasp < len(self.configuration) - 1:
@@ -128,7 +128,7 @@ def timed(
 
 
 def way_points(record: BinMap, row: int) -> tuple[FloatArray, FloatArray]:
-    """Way-points of a stored path: the planned part, and the straight approach.
+    """Waypoints of a stored path: the planned part, and the straight approach.
 
     The last of the first is the first of the second.
     """
@@ -230,7 +230,7 @@ def _along(way: FloatArray, place: FloatArray) -> tuple[FloatArray, FloatArray]:
 def _reached_at(
     way: FloatArray, time_s: float, velocity: FloatArray, acceleration: FloatArray
 ) -> FloatArray:
-    """Shares of the time at which the way-points after the first are reached."""
+    """Shares of the time at which the waypoints after the first are reached."""
     ramp = ramp_share(way, time_s, velocity, acceleration)
     share = np.linspace(0.0, 1.0, 2001)
     place, _ = trapezoid(share, ramp)

@@ -54,7 +54,7 @@ class GraspResults:
         Of the best path: clearance [m], the pair that comes closest (-1: none), joint
         margin [rad], smallest singular value; NaN without a path.
     configuration : array, shape (points, dof)
-        Way-points of all paths, one path after another.
+        Waypoints of all paths, one path after another.
     row_size, planned_size : int array, shape (paths,)
     place : int array, shape (paths, 2)
         Grasp and repeat of each path; repeat -1 for the roadmap's own, and for stages

@@ -57,7 +57,7 @@ class MarginMeter:
         path : array, shape (n, dof)
             From the scan configuration to the grasp, straight approach included.
         planned : int
-            Way-points of its planned part; the approach begins at the last of them.
+            Waypoints of its planned part; the approach begins at the last of them.
         """
         clearance, pair = self._clearance.of_path(path)
         approach = path[max(planned - 1, 0) :]

@@ -35,7 +35,7 @@ class WayIn(NamedTuple):
     path : array, shape (n, dof)
         Straight approach included.
     planned : int
-        Way-points of its planned part.
+        Waypoints of its planned part.
     repeat : int
         Attempt that it is, -1 for none.
     goal : int

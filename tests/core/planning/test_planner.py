@@ -272,7 +272,7 @@ def test_attempts_at_a_choice_of_goals_are_much_alike():
 
 
 def test_shortening_never_lengthens():
-    """Cutting corners and skipping way-points shorten or change nothing."""
+    """Cutting corners and skipping waypoints shorten or change nothing."""
     rng = np.random.default_rng(2)
     for _ in range(30):
         path = rng.normal(size=(8, 3))

@@ -49,7 +49,7 @@ def test_one_joint_with_cruise():
 
 
 def test_points_on_a_line_do_not_stop_the_arm():
-    """Way-points on a straight segment change nothing; a corner is a stop."""
+    """Waypoints on a straight segment change nothing; a corner is a stop."""
     v, a = np.ones(2), np.ones(2)
     straight = np.array([[0.0, 0.0], [1.0, 2.0]])
     dotted = np.array([[0.0, 0.0], [0.3, 0.6], [0.3, 0.6], [0.7, 1.4], [1.0, 2.0]])

@@ -245,7 +245,7 @@ PATH_RULES: list[tuple[str, Callable[[PathStore], dict[str, Any]], str]] = [
         "must name test grasps and attempts",
     ),
     (
-        "a way-point moved",
+        "a waypoint moved",
         lambda p: {
             "configuration": changed(
                 p.configuration, (1, 0), p.configuration[1, 0] + 0.1

@@ -91,7 +91,7 @@ class ClearanceMeter:
             return float("nan"), -1
         self._least, self._pair = np.inf, -1
         Q, travel = self._pieces(path)
-        # The last way-point, at the grasp, is the narrowest as a rule. Pairs that are
+        # The last waypoint, at the grasp, is the narrowest as a rule. Pairs that are
         # not looked at are as far apart as can be.
         d_last = self._distances(Q[-1], pairs, np.full(count, np.inf))
         known = d_last - travel[-1]

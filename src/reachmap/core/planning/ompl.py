@@ -104,12 +104,12 @@ class FoundPath:
         self._information, self._path, self._dof = information, path, dof
 
     def waypoints(self) -> FloatArray:
-        """Way-points, shape (n, dof)."""
+        """Waypoints, shape (n, dof)."""
         states = (self._path.getState(row) for row in range(self._path.getStateCount()))
         return np.array([[state[i] for i in range(self._dof)] for state in states])
 
     def simplified(self) -> FloatArray:
-        """Way-points after OMPL's own ``simplifyMax``."""
+        """Waypoints after OMPL's own ``simplifyMax``."""
         og.PathSimplifier(self._information).simplifyMax(self._path)
         return self.waypoints()
 

@@ -68,7 +68,7 @@ class Roadmap:
         At the turns of their joints that are nearest to the scan configuration.
     configurations : list of array, shape (dof,)
         Node 0 is the scan configuration, nodes 1 … ``goals`` are the goals, later
-        ones way-points of planned paths, or goals at other turns of their joints.
+        ones waypoints of planned paths, or goals at other turns of their joints.
     edges : list of (int, int)
         Verified straight motions.
     reached : list of int

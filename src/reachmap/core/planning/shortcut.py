@@ -1,6 +1,6 @@
 """Shortening of a found path.
 
-First every way-point that can be skipped is skipped, looking from the far end by
+First every waypoint that can be skipped is skipped, looking from the far end by
 halving; then the path ends at another goal if one is nearer; then random pairs of
 points on the path are joined where that is shorter (Geraerts and Overmars, "Creating
 high-quality paths for motion planning", 2007). The work is counted in tries, so the
@@ -28,7 +28,7 @@ def shorten(
     rng: np.random.Generator,
     goals: FloatArray | None = None,
 ) -> FloatArray:
-    """Skip way-points, look for a nearer goal, then cut corners.
+    """Skip waypoints, look for a nearer goal, then cut corners.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ def shorten(
 
 
 def skip_waypoints(path: FloatArray, is_free: MotionTest) -> FloatArray:
-    """Join each way-point to the furthest later one that halving finds."""
+    """Join each waypoint to the furthest later one that halving finds."""
     kept = list(path)
     start = 0
     while start < len(kept) - 2:
@@ -70,7 +70,7 @@ def skip_waypoints(path: FloatArray, is_free: MotionTest) -> FloatArray:
 def end_at_nearer_goal(
     path: FloatArray, goals: FloatArray, is_free: MotionTest
 ) -> FloatArray:
-    """Leave the path at a way-point, straight to a goal, where that is shorter.
+    """Leave the path at a waypoint, straight to a goal, where that is shorter.
 
     A planner stops at the first goal that it meets. With all goals available, paths are
     shorter and differ less from attempt to attempt.

@@ -82,7 +82,7 @@ def _check_paths(tree: Tree) -> list[str]:
     points = tree.array("paths/configuration")
     found = tree.array("path_found") == 1
     if index.shape[1:] != (5,) or int(rows.sum()) != len(points):
-        return ["paths/row_size must add up to the stored way-points"]
+        return ["paths/row_size must add up to the stored waypoints"]
     if (planned > rows).any():
         return ["paths/planned_size must not exceed row_size"]
     if index.size == 0:

@@ -14,7 +14,7 @@ from reachmap.maps.records import NO_PAIR, Status
 
 _ROTATION_TOLERANCE = 1e-6
 LENGTH_TOLERANCE_RAD = 1e-6
-"""By which lengths may differ from those of the stored way-points, and their share."""
+"""By which lengths may differ from those of the stored waypoints, and their share."""
 
 
 def require(holds: BoolArray, sentence: str) -> list[str]:
@@ -166,9 +166,9 @@ def path_lengths(
     ----------
     points : array, shape (points, dof)
     rows, planned : int array, shape (paths,)
-        Way-points of each path, and of its planned part.
+        Waypoints of each path, and of its planned part.
     """
-    # Length up to each way-point as if all paths were one; jumps between paths cancel.
+    # Length up to each waypoint as if all paths were one; jumps between paths cancel.
     steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
     travelled = np.concatenate([[0.0], np.cumsum(steps)])
     first = np.cumsum(rows) - rows

@@ -69,7 +69,7 @@ class CyclePlan:
     way_in : WayIn or None
         The path to the grasp that the cycle takes.
     paths : tuple of (array, int)
-        Path of each stage and its planned way-points; none unless all have one.
+        Path of each stage and its planned waypoints; none unless all have one.
     cycle_time_s : float
         Waits included; NaN unless every stage has a path.
     above_rim_m : float

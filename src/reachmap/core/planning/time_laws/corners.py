@@ -32,7 +32,7 @@ class BlendedPath:
     Attributes
     ----------
     corners : array, shape (n, dof)
-        Way-points, none of them on a straight line between its neighbours [rad].
+        Waypoints, none of them on a straight line between its neighbours [rad].
     blend : array, shape (n,)
         Length d along the joint motion at which each corner is left and joined [rad];
         0 where the arm stops, as at both ends. No corner is passed further away than
