@@ -1,4 +1,4 @@
-"""Scores on workers: what is remembered, and the same by hand."""
+"""Scores on workers: what is memoized, and the same by hand."""
 
 from __future__ import annotations
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from reachmap.cell.base_pose import T_world_bin_of, seen_from, with_base_at
+from reachmap.cell.base_pose import T_world_bin_of, with_base_at, with_world_at
 from reachmap.cell.loading import read_cell
 from reachmap.core.scene import Scene
 from reachmap.errors import CellError, SettingsError
@@ -186,7 +186,7 @@ def test_the_base_meets_what_stands_in_its_way():
 def test_the_same_cell_in_another_world_is_the_same_cell():
     """Relative poses of base, bin and bodies survive a change of the world."""
     loaded = read_cell("ur5-eye-in-hand")
-    seen = seen_from(loaded, MOVED)
+    seen = with_world_at(loaded, MOVED)
     for a, b in zip(loaded.cell.bodies, seen.cell.bodies, strict=True):
         if a.attach_to == "world":
             before = loaded.cell.T_base_world() @ a.pose.matrix()

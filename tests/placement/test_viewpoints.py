@@ -30,8 +30,8 @@ from reachmap.placement.mapped.viewpoints import (
     NOT_SEEN,
     camera_poses,
     picture_corners,
-    seen_from,
     view_of,
+    visibility_grades,
 )
 from tests.support.optional import present
 from tests.support.pinhole import corners_of, sees
@@ -62,7 +62,9 @@ def test_what_is_seen_against_a_pinhole(height, x, y, roll, tilt):
     cell, camera = CELL, present(CELL.camera)
     T = looking_down(height, x=x, y=y, roll_deg=roll)
     T[:3, :3] = Rotation.from_euler("y", tilt, degrees=True).as_matrix() @ T[:3, :3]
-    grade = seen_from(T[None], view_of(cell.bin.inner, cell.bin_scan.layers), camera)[0]
+    grade = visibility_grades(
+        T[None], view_of(cell.bin.inner, cell.bin_scan.layers), camera
+    )[0]
     inner = corners_of(cell.bin.inner, cell.bin.inner[2])
     bottom, top = inner[:4], inner[4:]
     volume = np.vstack([bottom, corners_of(cell.bin.inner, 0.05)[4:]])
@@ -99,7 +101,7 @@ def test_a_range_too_short_for_the_bin_still_gives_candidates():
     T = camera_poses(view, (0.5, 0.51))
     assert len(T)
     camera = read_cell(UR5, ["camera.range_m=[0.5,0.51]"]).cell.camera
-    grades = seen_from(T, view, present(camera))
+    grades = visibility_grades(T, view, present(camera))
     assert (grades == NOT_SEEN).all()
 
 

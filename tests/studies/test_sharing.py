@@ -10,7 +10,7 @@ import pytest
 
 from reachmap.cell.loading import LoadedCell, read_cell
 from reachmap.core import trace
-from reachmap.core.memo import Memo, fingerprint, remembered
+from reachmap.core.memo import Memo, fingerprint, memoized
 from reachmap.core.scene import Scene
 from reachmap.core.trace import EVERY, FREE, Trace
 from reachmap.tools import variant
@@ -102,12 +102,12 @@ def test_answers_are_asked_again_near_what_changed() -> None:
     Q = rng.uniform(-3.0, 3.0, (40, 3))
     memo = Memo()
     truth: set[tuple[bool, ...]] = set()
-    with memo.at_work():
+    with memo.active():
         for k in range(12):
             x, y = rng.uniform(-0.5, 0.5, 2).round(3) if k else (0.06, 0.0)
             loaded = toy(f"bodies.post.pose.xyz=[{x},{y},0]")
             scene = Scene.build(loaded, with_bin=False)
-            with_memo = remembered("k", scene, partial(asked, scene, Q))
+            with_memo = memoized("k", scene, partial(asked, scene, Q))
             assert with_memo == asked(scene, Q)
             truth.add(tuple(with_memo))
     # A body that is in the way nowhere gives what another one like it has given.
@@ -144,9 +144,9 @@ def test_questions_to_another_checker_are_not_taken_over() -> None:
     """A trace that is not whole says nothing; the result is computed each time."""
     scene, other = (Scene.build(toy(), with_bin=b) for b in (False, True))
     memo, q = Memo(), np.zeros(3)
-    with memo.at_work():
+    with memo.active():
         for _ in range(2):
-            remembered("k", scene, lambda: other.checker.is_free(q))
+            memoized("k", scene, lambda: other.checker.is_free(q))
     assert (memo.found, memo.computed) == (0, 2)
     assert Trace.current is None
 
@@ -155,9 +155,9 @@ def test_the_oldest_results_are_forgotten() -> None:
     """What a process keeps has a bound in questions."""
     scene, q = Scene.build(toy(), with_bin=False), np.zeros(3)
     memo = Memo(most_questions=3)
-    with memo.at_work():
+    with memo.active():
         for key in ("a", "b", "c", "d", "a", "d"):
-            remembered(key, scene, lambda: scene.checker.is_free(q))
+            memoized(key, scene, lambda: scene.checker.is_free(q))
     assert (memo.found, memo.computed) == (1, 5)
 
 
@@ -168,8 +168,8 @@ def test_a_computation_that_asks_very_much_is_not_kept(
     monkeypatch.setattr(trace, "MOST_QUESTIONS", 3)
     scene, memo = Scene.build(toy(), with_bin=False), Memo()
     Q = np.zeros((4, 3))
-    with memo.at_work():
+    with memo.active():
         for _ in range(2):
-            remembered("few", scene, partial(asked, scene, Q[:3]))
-            remembered("many", scene, partial(asked, scene, Q))
+            memoized("few", scene, partial(asked, scene, Q[:3]))
+            memoized("many", scene, partial(asked, scene, Q))
     assert (memo.found, memo.computed) == (1, 3)

@@ -21,7 +21,7 @@ class ClosedForm(Evaluator):
     Attributes
     ----------
     asked : list of pose
-        Every pose that was looked at, in order; a score is remembered.
+        Every pose that was looked at, in order; a score is memoized.
     expected : list of (int, int)
         What was announced: poses looked at by then, and how many more at most.
     """

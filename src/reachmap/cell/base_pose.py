@@ -1,4 +1,4 @@
-"""The cell with its arm mounted elsewhere, while bin and surroundings stay."""
+"""The cell with its base moved, while bin and surroundings stay in place."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def base_links(loaded: LoadedCell) -> tuple[str, ...]:
     return tuple(robot.fixed_to(link))
 
 
-def stands_of(loaded: LoadedCell) -> tuple[str, ...]:
+def mounting_bodies(loaded: LoadedCell) -> tuple[str, ...]:
     """The mount, and bodies on the world that may touch the arm's base."""
     links, mount = set(base_links(loaded)), loaded.cell.robot.mount
     return tuple(
@@ -57,8 +57,8 @@ def T_world_bin_of(cell: Cell) -> FloatArray:  # noqa: N802
     return np.asarray(cell.robot.base_pose.matrix() @ cell.T_base_bin())
 
 
-def seen_from(loaded: LoadedCell, T_world_frame: FloatArray) -> LoadedCell:
-    """The same cell with another frame for its world.
+def with_world_at(loaded: LoadedCell, T_world_frame: FloatArray) -> LoadedCell:
+    """The same cell, its poses expressed in another world frame.
 
     Parameters
     ----------
@@ -85,13 +85,13 @@ def seen_from(loaded: LoadedCell, T_world_frame: FloatArray) -> LoadedCell:
             "robot": cell.robot.model_copy(update={"base_pose": base, "mount": None}),
             "bin": _bin_in_world(cell, T @ T_world_bin_of(cell)),
             "workspace_scan": cell.workspace_scan.model_copy(update={"frame": WORLD}),
-            "drop_off": _seen_drop_offs(cell, T),
+            "drop_off": _drop_offs_in(cell, T),
         }
     )
     return _rebuilt(loaded, moved)
 
 
-def _seen_drop_offs(cell: Cell, T: FloatArray) -> Any:
+def _drop_offs_in(cell: Cell, T: FloatArray) -> Any:
     """Drop-offs whose poses are in the world, seen from the new one."""
     if cell.drop_off is None:
         return None
@@ -138,7 +138,7 @@ def with_base_at(
 
 
 def with_joint_at(loaded: LoadedCell, joint: str, position: float) -> LoadedCell:
-    """The cell with a locked joint elsewhere [deg; m if prismatic]."""
+    """The cell with a locked joint at another position [deg; m if prismatic]."""
     locked = loaded.cell.robot.locked_joints_deg | {joint: position}
     robot = loaded.cell.robot.model_copy(update={"locked_joints_deg": locked})
     return _rebuilt(loaded, loaded.cell.model_copy(update={"robot": robot}))
@@ -165,7 +165,7 @@ def _bin_in_world(cell: Cell, T_world_bin: FloatArray) -> Any:
 
 
 def _carried(body: BodySpec, T_before: FloatArray, T_after: FloatArray) -> BodySpec:
-    """A stand that goes with the base; see :func:`with_base_at`."""
+    """A mounting body that moves with the base; see :func:`with_base_at`."""
     T = T_after @ inverse_transform(T_before) @ body.pose.matrix()
     up = (T_after @ inverse_transform(T_before))[:3, 2]
     raised = float(T_after[2, 3] - T_before[2, 3])
@@ -205,7 +205,7 @@ def _rebuilt(loaded: LoadedCell, cell: Cell) -> LoadedCell:
 
 
 def turned_about_y(degrees: float) -> FloatArray:
-    """Lean of a base whose z axis leans from the vertical towards +x, (3, 3)."""
+    """Rotation of a base whose z axis is tilted from the vertical to +x, (3, 3)."""
     angle = np.radians(degrees)
     c, s = np.cos(angle), np.sin(angle)
     R = np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])

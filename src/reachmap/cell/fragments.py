@@ -19,7 +19,7 @@ FILES = ("urdf", "srdf", "joint_limits")
 
 
 def fragment_overrides(path: Path, cell_text: str, label: str) -> tuple[str, ...]:
-    """Overrides that put a fragment in the place of what a cell says.
+    """Overrides that replace sections of a cell by those of a fragment.
 
     A fragment has sections of a cell file. Each key of a section replaces the cell's
     (``robot.urdf``, ``scan_configuration.q_deg``); bodies replace those of the same
@@ -65,7 +65,7 @@ def fragment_overrides(path: Path, cell_text: str, label: str) -> tuple[str, ...
 
 
 def _joined(own: Sequence[Any], new: Sequence[Any]) -> list[Any]:
-    """Entries of both lists; of one name, the new one in the place of the old."""
+    """Entries of both lists; a new entry replaces the old one of the same name."""
     entries = {at(item, "name"): item for item in own}
     return [*(entries | {at(item, "name"): item for item in new}).values()]
 

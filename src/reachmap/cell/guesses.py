@@ -1,4 +1,4 @@
-"""Guesses at an arm of which only the URDF is known: base, flange, fingers."""
+"""Guesses about an arm from its URDF alone: base, flange, fingers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The loaded cell: description, texts and fingerprints, ready for workers."""
+"""The loaded cell: description, texts and hashes, ready to be sent to workers."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from reachmap.errors import CellError
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LoadedCell:
-    """A cell with everything it refers to; pickles, and is what workers are sent.
+    """A cell with everything it refers to; can be pickled and sent to workers.
 
     Attributes
     ----------
@@ -54,7 +54,7 @@ class LoadedCell:
     joint_limits : mapping
         MoveIt's ``joint_limits`` as read; they are also merged into ``cell``.
     warnings : tuple of str
-        Things that are allowed but doubtful.
+        Warnings about things that are allowed but suspicious.
     """
 
     cell: Cell
@@ -143,7 +143,7 @@ class LoadedCell:
         return self.with_cell(self.cell.model_copy(update={"bins": dict(bins)}))
 
     def fillings(self) -> tuple[LoadedCell, ...]:
-        """The cell for each level of the parts in its bin, which has no other layer.
+        """One cell per filling level of the bin, with that level as its only layer.
 
         The parts below the level are an obstacle. A cell whose layers are not levels
         of a filling is its own only one.
@@ -154,7 +154,7 @@ class LoadedCell:
         return tuple(self.filled_to(k) for k in range(len(spec.layers)))
 
     def filled_to(self, layer: int) -> LoadedCell:
-        """The cell with its bin filled to one of the layers, the only one left."""
+        """The cell with its bin filled to one of its layers, which it keeps alone."""
         return self.filled_up_to(self.cell.bin_scan.layers[layer])
 
     def filled_up_to(self, height_m: float) -> LoadedCell:
@@ -187,7 +187,7 @@ class LoadedCell:
 def fingerprint(
     cell: Cell, urdf: str, srdf: str, files_sha256: Mapping[str, str]
 ) -> str:
-    """Sha256 of what a cell *is*, whatever its files are called and where they lie.
+    """Sha256 of the contents of a cell, independent of file names and folders.
 
     File references give way to the sha256 of their bytes; description, package
     folders, parameters, the carrier's name and xacro arguments, whose effect is
@@ -225,7 +225,7 @@ def fingerprint(
 
 
 def _reduce_cycle(cell: Cell, data: dict[str, Any]) -> None:
-    """Keep of the pick cycle what has an effect: nothing of it without a part."""
+    """Drop keys of the pick cycle that have no effect: all of them without a part."""
     del data["parts"]
     held = cell.held()
     if held is None:

@@ -10,7 +10,7 @@ from typing import NamedTuple
 from reachmap.cell.bins.carriers import write_out_carriers
 from reachmap.cell.bins.filling import write_out_fill
 from reachmap.cell.bins.names import gather_bins, write_out_bins
-from reachmap.cell.bins.support import stood_on_supports
+from reachmap.cell.bins.support import with_bins_on_supports
 from reachmap.cell.files.files import compare_hashes, read_files, stored_files
 from reachmap.cell.files.resources import shipped_folder
 from reachmap.cell.loaded import LoadedCell, fingerprint
@@ -214,7 +214,7 @@ def cell_from_json(
     compare_hashes(document, files, files_sha256 or {})
     if changes:
         check_bins_stand(document, cell)
-        cell = stood_on_supports(document, cell)
+        cell = with_bins_on_supports(document, cell)
     document.raise_mistakes()
     return LoadedCell(
         cell=cell,

@@ -9,7 +9,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from reachmap.cell.bins.support import stood_on_supports
+from reachmap.cell.bins.support import with_bins_on_supports
 from reachmap.cell.files.files import CellFiles
 from reachmap.cell.files.joint_limits import tighten_limits
 from reachmap.cell.files.resources import SCHEME, SHIPPED, Resolver, shipped_folder
@@ -86,7 +86,7 @@ def resolved_cell(
         document.raise_mistakes()
         raise
     check_bins_stand(document, resolved)
-    resolved = stood_on_supports(document, resolved)
+    resolved = with_bins_on_supports(document, resolved)
     document.raise_mistakes()
     return resolved
 

@@ -1,4 +1,4 @@
-"""Bodies of a cell, where 0.1 had them; now in ``core.collision.bodies``."""
+"""Former place of ``core.collision.bodies``, kept until 0.3."""
 
 from reachmap.core.collision.bodies import build_geometry
 

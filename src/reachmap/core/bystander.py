@@ -48,7 +48,7 @@ class Bystander:
         requests = self._pool.getGeometryData(0).collisionRequests
         for request, margin in zip(requests, margins, strict=True):
             request.security_margin = float(margin)
-        guess_nothing(requests)
+        disable_cached_guesses(requests)
 
     def touched(self, Q: FloatArray) -> BoolArray:
         """Whether any of the pairs touches, shape (n, joints) to (n,)."""
@@ -57,8 +57,8 @@ class Bystander:
         return np.asarray(found, bool)
 
 
-def guess_nothing(requests: Any) -> None:
-    """Let checks begin from nothing that an earlier one has left.
+def disable_cached_guesses(requests: Any) -> None:
+    """Make checks independent of guesses cached by earlier ones.
 
     Its guess would change answers in the last digits, and saves no time that could be
     measured.

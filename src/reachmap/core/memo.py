@@ -1,4 +1,4 @@
-"""Results of computations, for cells in which they would come out the same."""
+"""Memoized results of computations, shared between cells that give the same result."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ NEVER_READ = ("name", "description", "parameters", "expressions")
 def fingerprint(
     loaded: LoadedCell, *, without: Collection[str] = (), surroundings: bool = True
 ) -> str:
-    """Equal for cells that are the same to a computation.
+    """Hash that is equal for cells a computation cannot distinguish.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ def fingerprint(
     without : collection of str
         Parts of the cell that the computation does not read: ``bin``, ``bin.pose``.
     surroundings : bool
-        Whether places and sizes of what stands in the world count.
+        Whether poses and sizes of the bodies on the world count.
     """
     data = json.loads(loaded.resolved_json)
     for name in (*NEVER_READ, *without):
@@ -46,7 +46,7 @@ def fingerprint(
             part = part[parent]
         part.pop(last, None)
     if not surroundings:
-        # A camera goes where the body goes that it is mounted on.
+        # A camera moves with the body that it is mounted on.
         camera = loaded.cell.camera
         names = {*world_shapes(loaded)} - {camera.parent if camera else ""}
         for body in data["bodies"]:
@@ -59,7 +59,7 @@ def fingerprint(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Surroundings:
-    """What :func:`fingerprint` can leave out: text and box of each body, by name."""
+    """What :func:`fingerprint` may leave out: text and box of each body, by name."""
 
     text: dict[str, str]
     box: dict[str, Box]
@@ -80,7 +80,7 @@ class _Surroundings:
         )
 
     def changed(self, other: _Surroundings) -> list[tuple[str, Box]]:
-        """What is not the same in another cell, with the boxes here and there."""
+        """Bodies that differ in another cell, with their boxes in both."""
         return [
             (name, box)
             for name in self.box
@@ -107,16 +107,16 @@ class _Within:
 
 
 class Memo:
-    """Keeps results with what they rest on; the latest of them, up to a size.
+    """Cache of results with the queries they depend on; the oldest are evicted.
 
     Attributes
     ----------
     found, computed : int
-        Results taken over so far, and those that had to be computed.
+        Results reused so far, and those that had to be computed.
     """
 
     current: ClassVar[Memo | None] = None
-    """What :func:`remembered` asks; None computes everything."""
+    """The memo that :func:`memoized` uses; None computes everything."""
 
     def __init__(self, most_questions: int = MOST_QUESTIONS) -> None:
         self._most, self._questions = most_questions, 0
@@ -125,8 +125,8 @@ class Memo:
         self.found = self.computed = 0
 
     @contextmanager
-    def at_work(self) -> Iterator[None]:
-        """Context in which :func:`remembered` asks this memo."""
+    def active(self) -> Iterator[None]:
+        """Context in which :func:`memoized` uses this memo."""
         Memo.current = self
         try:
             yield
@@ -134,7 +134,7 @@ class Memo:
             Memo.current = None
 
     def result(self, key: str, scene: Scene, compute: Callable[[], Result]) -> Result:
-        """See :func:`remembered`."""
+        """See :func:`memoized`."""
         within = _Within(key, scene, _Surroundings.of(scene))
         outer, self._within = self._within, within
         try:
@@ -143,7 +143,7 @@ class Memo:
             self._within = outer
 
     def part(self, key: str, compute: Callable[[], Result]) -> Result:
-        """See :func:`remembered_part`."""
+        """See :func:`memoized_part`."""
         if self._within is None:
             return compute()
         return self._result(f"{self._within.key} {key}", self._within, compute)
@@ -153,7 +153,7 @@ class Memo:
     ) -> Result:
         checker, outer = within.scene.checker, Trace.current
         before = checker.checks
-        known = self._taken_over(key, within)
+        known = self._transferable(key, within)
         if known is None:
             self.computed += 1
             trace = Trace(checker)
@@ -168,21 +168,21 @@ class Memo:
             if trace.is_whole:
                 self._known.setdefault(key, []).append(known)
                 self._questions += len(trace)
-                self._forget_oldest()
+                self._evict_oldest()
         else:
             self.found += 1
-            # Budgets count what a computation checks, whoever has done it.
+            # Budgets count the checks of a computation even where it was reused.
             checker.checks = before + known.checks
         if outer is not None:
             outer.include(known.trace)
         found: Result = known.result
         return found
 
-    def _taken_over(self, key: str, within: _Within) -> _Known | None:
-        """What another cell has found, if it is the same here."""
+    def _transferable(self, key: str, within: _Within) -> _Known | None:
+        """Result of another cell that is also valid here, or None."""
         entries = self._known.setdefault(key, [])
         self._known.move_to_end(key)
-        # What is asked again now is no question of a computation.
+        # Queries that are repeated here belong to no computation.
         outer, Trace.current = Trace.current, None
         try:
             for known in reversed(entries):
@@ -193,20 +193,20 @@ class Memo:
             Trace.current = outer
         return None
 
-    def _forget_oldest(self) -> None:
+    def _evict_oldest(self) -> None:
         while self._questions > self._most and self._known:
             _, entries = self._known.popitem(last=False)
             self._questions -= sum(len(known.trace) for known in entries)
 
 
-def remembered(key: str, scene: Scene, compute: Callable[[], Result]) -> Result:
-    """Compute a result, or take it over from a cell in which it is the same.
+def memoized(key: str, scene: Scene, compute: Callable[[], Result]) -> Result:
+    """Compute a result, or reuse that of a cell in which it is the same.
 
     Parameters
     ----------
     key : str
-        Equal where the result depends on nothing but the answers to what is asked of
-        the scene's checker: see :func:`fingerprint`.
+        Equal where the result depends only on the answers of the scene's checker; see
+        :func:`fingerprint`.
     scene : Scene
     compute : callable
         Its result must not be changed afterwards.
@@ -216,8 +216,8 @@ def remembered(key: str, scene: Scene, compute: Callable[[], Result]) -> Result:
     return Memo.current.result(key, scene, compute)
 
 
-def remembered_part(name: str, compute: Callable[[], Result], *args: Any) -> Result:
-    """Compute a part of such a result, or take it over where all of it cannot be.
+def memoized_part(name: str, compute: Callable[[], Result], *args: Any) -> Result:
+    """Compute a part of such a result, or reuse it where the whole cannot be reused.
 
     Parameters
     ----------
@@ -226,7 +226,7 @@ def remembered_part(name: str, compute: Callable[[], Result], *args: Any) -> Res
     compute : callable
         Its result must not be changed afterwards.
     *args : array, number, text or state of a generator, or sequence of these
-        All that it depends on besides the cell. Looked at where a memo is at work only.
+        All that it depends on besides the cell; only hashed while a memo is active.
     """
     if Memo.current is None:
         return compute()

@@ -1,4 +1,4 @@
-"""Solids of a cell, where 0.1 had them; now in ``core.collision.solids``."""
+"""Former place of ``core.collision.solids``, kept until 0.3."""
 
 from reachmap.core.collision.solids import SolidCell
 

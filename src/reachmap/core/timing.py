@@ -1,4 +1,4 @@
-"""Execution times, where 0.1 had them; now in ``core.planning.timing``."""
+"""Former place of ``core.planning.timing``, kept until 0.3."""
 
 from reachmap.core.planning.timing import execution_time_s
 

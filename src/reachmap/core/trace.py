@@ -1,4 +1,4 @@
-"""What a computation asked about collisions, and whether another cell answers the same.
+"""Collision queries of a computation, and whether another cell answers them alike.
 
 A computation that sees its cell through a checker alone ends the same way in another
 cell, to the last bit, if everything it asked has the same answer there. So a result is

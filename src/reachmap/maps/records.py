@@ -11,6 +11,7 @@ import numpy as np
 
 from reachmap._typing import BoolArray, CodeArray, FloatArray, IntArray
 from reachmap.geometry import yaw_transform
+from reachmap.maps.display import Shown, ShownBin
 from reachmap.maps.parts import (
     ApproachTimes,
     BestPaths,
@@ -22,7 +23,6 @@ from reachmap.maps.parts import (
     Refinement,
     freeze,
 )
-from reachmap.maps.showing import Shown, ShownBin
 from reachmap.sampling.lattice import Lattice, Stitching, pooled_percent, stitch
 
 NO_PAIR = -1

@@ -13,7 +13,7 @@ from reachmap.core.collision.bin_fit import BinFit
 from reachmap.errors import SceneError
 from reachmap.geometry import inverse_transform
 from reachmap.maps.records import Status
-from reachmap.maps.summary.nothing import most_likely_cause
+from reachmap.maps.summary.unreachable import most_likely_cause
 from reachmap.placement.mapped.candidates import Candidate, CandidateTable
 from reachmap.placement.mapped.exact import PlacedScene, Pose
 from reachmap.placement.mapped.imaging import UNSEEN

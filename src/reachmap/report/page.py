@@ -19,7 +19,7 @@ from reachmap.report.map_parts import (
     placement_section,
     workspace_section,
 )
-from reachmap.report.origin_part import origin_section
+from reachmap.report.provenance_part import origin_section
 from reachmap.report.ranking_part import ranking_section
 from reachmap.report.validation_part import validation_section
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
-from reachmap.core.memo import fingerprint, remembered
+from reachmap.core.memo import fingerprint, memoized
 from reachmap.core.scene import Scene
 from reachmap.runtime.encoding import decode, encode
 from reachmap.runtime.job import Job, Work, one_frame
@@ -57,7 +57,7 @@ class _InPlace:
     def _text(self, name: str, compute: Callable[[], Any]) -> str:
         key = f"{name} {self._so_far.hexdigest()}"
         text = (
-            remembered(key, self._scene, lambda: encode(compute()))
+            memoized(key, self._scene, lambda: encode(compute()))
             if self._is_all
             else encode(compute())
         )

@@ -20,7 +20,7 @@ from reachmap.geometry import (
     yaw_transform,
 )
 from reachmap.maps.records import NO_PAIR, Status
-from reachmap.maps.summary.nothing import most_likely_cause
+from reachmap.maps.summary.unreachable import most_likely_cause
 from reachmap.sampling.frames import FrameGrid, approach_distance_m, bin_test_frames
 from reachmap.tools.trial import reach_of
 
@@ -119,7 +119,7 @@ def guess_bin(
         tool_m = carried_m + depths * scene.loaded.cell.bin.inner[2]
         share = trial.share(tool_m)
         if best is None:
-            why = "" if share else trial.why_nothing(tool_m)
+            why = "" if share else trial.why_unreachable(tool_m)
         if best is None or share > best.share:
             best = BinGuess(
                 xyz_m=trial.xyz_m,
@@ -236,7 +236,7 @@ class _Trial:
         T = self._T[met] @ _along(scene, -tool_m - self._approach_m)
         return float(_free(scene, T).sum() / len(self._T))
 
-    def why_nothing(self, tool_m: float) -> str:
+    def why_unreachable(self, tool_m: float) -> str:
         """Most likely reason why nothing is reached with a tool."""
         scene = self._scene()
         Q, frame, free = _solutions(scene, self._T @ _along(scene, -tool_m))

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from reachmap.maps import BinMap, WorkspaceMap
-from reachmap.maps.summary.nothing import why_nothing
+from reachmap.maps.summary.unreachable import why_unreachable
 from reachmap.runtime.options import RunOptions
 from reachmap.runtime.store import store_path
 
@@ -26,6 +26,6 @@ def written_by(output: Path, run: RunOptions) -> Path:
 
 def warn_of_nothing(record: WorkspaceMap | BinMap | None, output: Path) -> None:
     """Say on stderr why a map has nothing reachable, if it has nothing."""
-    why = "" if record is None else why_nothing(record)
+    why = "" if record is None else why_unreachable(record)
     if why:
         logger.warning("%s: %s", output, why)

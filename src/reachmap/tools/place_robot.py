@@ -13,8 +13,8 @@ from reachmap._typing import FloatArray
 from reachmap.cell.base_pose import (
     heading_rad,
     level_frame,
-    seen_from,
-    stands_of,
+    mounting_bodies,
+    with_world_at,
 )
 from reachmap.cell.fragments import fragment_overrides
 from reachmap.cell.loaded import LoadedCell
@@ -203,7 +203,7 @@ def _searched(
 ) -> BaseSearch:
     along_world = bool({"x", "y"} & {*choice.limits, *choice.fixed})
     T_world_level = level_frame(loaded.cell, along_world=along_world)
-    levelled = seen_from(loaded, T_world_level)
+    levelled = with_world_at(loaded, T_world_level)
     T_level_base = T_level_base_of(loaded, T_world_level)
     how = _mounting(name, loaded, choice, T_level_base)
     scene = how.scene(levelled)
@@ -259,7 +259,7 @@ def _mounting(
                 f"{body!r:.60} is not a body on the world "
                 f"(those are: {', '.join(sorted(known)) or 'none'})"
             )
-    stands = dict.fromkeys([*stands_of(loaded), *choice.moves])
+    stands = dict.fromkeys([*mounting_bodies(loaded), *choice.moves])
     kept = tuple(body for body in stands if body not in choice.stays)
     return Mounting.of(name, T_level_base[:3, :3], kept)
 

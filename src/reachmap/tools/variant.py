@@ -77,7 +77,7 @@ def workspace_key(loaded: LoadedCell) -> str:
 def map_workspace(context: Any, loaded: LoadedCell) -> dict[str, Any]:
     """Results of the test frames of a workspace map, or why there are none."""
     try:
-        with _MEMO.at_work():
+        with _MEMO.active():
             payloads = payloads_in_place(
                 workspace_work(loaded),
                 Scene.shared(loaded, with_bin=False),
@@ -91,7 +91,7 @@ def map_workspace(context: Any, loaded: LoadedCell) -> dict[str, Any]:
 def compute_variant(context: VariantContext, unit: VariantUnit) -> dict[str, Any]:
     """Map a variant; what is wrong with it is a result, too."""
     try:
-        with _MEMO.at_work():
+        with _MEMO.active():
             return _computed(context, unit)
     except ReachmapError as error:
         return failure(_cause(error))

@@ -1,4 +1,4 @@
-"""Load carriers as they are sold, and what a cell that names one stands for."""
+"""Standard load carriers, and the dimensions they give to a bin."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class Carrier:
     derived: str = ""
 
     def keys(self) -> dict[str, Any]:
-        """What it stands for in ``bin``, in metres, as a cell file has it."""
+        """The keys of ``bin`` that it defines, in metres."""
         found: dict[str, Any] = {
             "inner": _metres(self.inner_mm),
             "wall": _metres(self.wall_mm),
@@ -76,7 +76,7 @@ def _metres(lengths_mm: Any) -> list[float]:
 
 @cache
 def carriers() -> tuple[Carrier, ...]:
-    """All that are known, in the order of the file."""
+    """All known carriers, in the order of the file."""
     text = files("reachmap").joinpath("cell/data/carriers.json").read_text("utf-8")
     entries: list[dict[str, Any]] = [
         {k: tuple(v) if isinstance(v, list) else v for k, v in entry.items()}
@@ -86,7 +86,7 @@ def carriers() -> tuple[Carrier, ...]:
 
 
 def find_carrier(name: str) -> Carrier | None:
-    """Carrier of a name, in whatever case and with whatever separators."""
+    """Find a carrier by name, ignoring case and separators."""
     return next(
         (
             carrier
@@ -102,7 +102,7 @@ def _plain(name: str) -> str:
 
 
 def write_out_carriers(document: Document) -> None:
-    """Give each bin the dimensions of its carrier, where it has none of its own.
+    """Fill in missing dimensions of each bin from its carrier.
 
     A carrier that an override names takes the place of the file's own dimensions, but
     not of those that are overridden as well. An unknown name becomes a mistake.
@@ -139,6 +139,6 @@ def _write_out_carrier(document: Document, place: Location) -> None:
 
 
 def _stand_in(tray: dict[str, Any]) -> None:
-    """Give a bin without a known carrier some size: that it has none is no mistake."""
+    """Give a bin of unknown carrier some size, so that this is the only mistake."""
     if tray.get("inner") is None:
         tray["inner"] = [1.0, 1.0, 1.0]

@@ -1,4 +1,4 @@
-"""Levels of the parts in a bin, written out as the layers that a scan looks at."""
+"""Filling levels of a bin, expanded to the layers of a scan."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ KEYS = ("fill", "fill_heights_m")
 
 
 def write_out_fill(document: Document) -> None:
-    """Set ``bin_scan.layers`` to the heights that ``fill`` stands for.
+    """Set ``bin_scan.layers`` to the heights that ``fill`` defines.
 
     What is wrong with the keys themselves is left to validation.
     """

@@ -1,6 +1,6 @@
-"""Several bins by name: the one that a scan is about, and the others beside it.
+"""Several bins by name: the one to pick from, and the others as obstacles.
 
-A cell file has ``bins`` and, if need be, ``pick_from``. A cell in memory has that one
+A cell file has ``bins`` and optionally ``pick_from``. A cell in memory has that one
 as ``bin``, with its name, and the others as ``bins``.
 """
 
@@ -16,7 +16,7 @@ CHOICE = "pick_from"
 
 
 def gather_bins(document: Document) -> None:
-    """Put the bins of a resolved cell back as a file has them, in place."""
+    """Collect the bins of a resolved cell under ``bins`` as in a file, in place."""
     data, name = document.data, text_at(document.data, "bin", "name")
     if name is None:
         return
@@ -27,9 +27,9 @@ def gather_bins(document: Document) -> None:
 
 
 def write_out_bins(document: Document) -> None:
-    """Make ``bin`` of the bin that is picked from, in place.
+    """Set ``bin`` to the bin to pick from, in place.
 
-    Mistakes are still told where they are written.
+    Mistakes are still reported where they were written.
     """
     data = document.data
     bins, wanted = at(data, "bins"), text_at(data, CHOICE)

@@ -1,4 +1,4 @@
-"""What a bin can stand on: the level top faces of bodies that do not move."""
+"""Supports of bins: the horizontal top faces of static bodies."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class TopFace:
     z: float
 
     def overhang_m(self, points: FloatArray) -> float:
-        """How far points (n, 2) reach beyond the face, at most 0 where none does."""
+        """How far points (n, 2) extend beyond the face; 0 or less where none does."""
         along = np.roll(self.polygon, -1, axis=0) - self.polygon
         outward = np.column_stack([along[:, 1], -along[:, 0]])
         outward /= np.linalg.norm(outward, axis=1, keepdims=True)
@@ -88,7 +88,7 @@ def footprint_of_bin(spec: BinSpec, T_to_bin: FloatArray) -> FloatArray:
 
 
 def support_of(spec: BinSpec, T_to_bin: FloatArray, faces: tuple[TopFace, ...]) -> str:
-    """Name of the body that a bin stands on, "" where it floats.
+    """Name of the body that supports a bin, "" where it floats.
 
     Parameters
     ----------
@@ -106,8 +106,8 @@ def support_of(spec: BinSpec, T_to_bin: FloatArray, faces: tuple[TopFace, ...]) 
     return next(under, "")
 
 
-def stood_on_supports(document: Document, cell: Cell) -> Cell:
-    """The cell with its bins on the bodies that their ``on`` names, if they name any.
+def with_bins_on_supports(document: Document, cell: Cell) -> Cell:
+    """The cell with each bin placed on the body that its ``on`` names, if any.
 
     Mistakes are added to the document where the body has no level top face, the bin
     does not fit on it, or leans.
@@ -115,16 +115,16 @@ def stood_on_supports(document: Document, cell: Cell) -> Cell:
     for place, spec in cell.every_bin():
         if spec.on is None:
             continue
-        T_base_bin = _stood(document, cell, spec, (*place, "on"))
+        T_base_bin = _on_support(document, cell, spec, (*place, "on"))
         if T_base_bin is not None:
             cell = cell.with_spec_at(spec, T_base_bin, spec.frame)
     return cell
 
 
-def _stood(
+def _on_support(
     document: Document, cell: Cell, spec: BinSpec, where: Location
 ) -> FloatArray | None:
-    """T_base_bin of a bin that stands on the body that it names."""
+    """T_base_bin of a bin on the body that its ``on`` names."""
     T_base_world = cell.T_base_world()
     T_world_bin = inverse_transform(T_base_world) @ cell.T_base_of(spec)
     every, name = top_faces(cell, np.eye(4)), spec.on

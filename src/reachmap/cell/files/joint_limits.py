@@ -1,6 +1,6 @@
 """MoveIt's ``joint_limits.yaml``: limits that tighten those of the URDF.
 
-Read as MoveIt reads it: each side of a range counts by itself, a number counts unless
+Read as MoveIt reads it: each side of a range counts separately, a number counts unless
 its ``has_…_limits`` says no, ``!degrees`` and ``!radians`` are units.
 """
 
@@ -86,7 +86,7 @@ def parse_joint_limits(
 
 
 def _scaling_notes(document: Document) -> list[str]:
-    """Say that MoveIt would drive the arm slower than the limits."""
+    """Warn of scaling factors by which MoveIt would slow the arm down."""
     notes = []
     for kind in ("velocity", "acceleration"):
         key = f"default_{kind}_scaling_factor"
@@ -100,7 +100,7 @@ def _scaling_notes(document: Document) -> list[str]:
 
 
 def _unread_notes(document: Document) -> list[str]:
-    """Name keys of joints that count for nothing, each where it comes first."""
+    """Warn of ignored keys of joints, each at its first occurrence."""
     places = {
         str(key): ("joint_limits", name, key)
         for name, entry in reversed(document.data["joint_limits"].items())
@@ -160,7 +160,7 @@ def tighten_limits(
 ) -> list[str]:
     """Write the limits of a MoveIt file into ``robot.limits``; the tightest wins.
 
-    Joints that are left without a range are told.
+    Joints that are left without a range are reported.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What a MoveIt configuration package holds that a cell can use."""
+"""The files of a MoveIt configuration package that a cell can use."""
 
 from __future__ import annotations
 

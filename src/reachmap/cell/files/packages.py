@@ -1,4 +1,4 @@
-"""ROS packages that lie around a file: its own package, and that package's neighbours.
+"""ROS packages around a file: its own package, and that package's neighbours.
 
 A package is a folder with ``package.xml`` (or ROS 1's older ``manifest.xml``). Around a
 file, a folder of the package's name will do as well: unpacked archives often lack the

@@ -41,7 +41,7 @@ class SceneBody:
 
 
 def read_scene(path: Path) -> tuple[list[SceneBody], list[str]]:
-    """Read the bodies of a file, and say what of it cannot be used.
+    """Read the bodies of a file, and report those that cannot be used.
 
     A YAML file that is not a planning scene has no bodies.
 
@@ -104,7 +104,7 @@ def _shape(rows: Iterator[str]) -> tuple[dict[str, Any] | None, str]:
 
 
 def _primitive(kind: str, sizes: list[float]) -> dict[str, Any] | None:
-    """Shape of a cell's body; None for kinds that a cell has not.
+    """Shape of a cell's body; None for kinds that cells do not support.
 
     ValueError if a kind has other numbers than it should.
     """

@@ -42,7 +42,7 @@ INSTALLED = ("share", "src", "install")
 
 
 class NotFoundError(LookupError):
-    """A reference leads to no file; the message lists every place tried."""
+    """A referenced file does not exist; the message lists every place tried."""
 
 
 def shipped_folder() -> Path:
@@ -237,7 +237,7 @@ class Resolver:
         return found, _normal(candidates[found])
 
     def missing_package(self, name: str, reference: str) -> str:
-        """Say where a package was looked for in vain, and what to do."""
+        """Report where a package was searched for, and what to do."""
         _, tried = self.package_folders(name)
         places = ", ".join(str(folder) for folder in tried) or "nowhere"
         return (

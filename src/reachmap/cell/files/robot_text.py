@@ -60,7 +60,7 @@ def robot_text(
 
 
 def _refuse_xacro(text: str, path: Path) -> None:
-    """Refuse what would have to be expanded; definitions alone do no harm."""
+    """Refuse a text that needs xacro; macro definitions alone are harmless."""
     todo = [parse_xml(text, path.name)]
     while todo:
         element = todo.pop()

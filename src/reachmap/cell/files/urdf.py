@@ -105,7 +105,7 @@ class UrdfDescription:
         return tuple(joint.name for joint in self.way(base, tip) if joint.moves)
 
     def way(self, base: str, tip: str) -> tuple[UrdfJoint, ...]:
-        """List all joints on that way, fixed ones included."""
+        """List all joints between two frames, fixed ones included."""
         shared = {link for link, _ in self._way_up(base)}
         joints = []
         for link, joint in self._way_up(tip):
@@ -237,7 +237,7 @@ def _joint(
 
 
 def _with_leaders(joints: list[UrdfJoint], notes: list[str]) -> list[UrdfJoint]:
-    """Let joints that mimic what does not move go their own way, as MoveIt does."""
+    """Make joints that mimic a fixed joint independent, as MoveIt does."""
     leaders = {joint.name for joint in joints if joint.type in MOVING}
     stray = {j.name for j in joints if j.mimics is not None and j.mimics not in leaders}
     notes += [

@@ -1,4 +1,4 @@
-"""Expanding xacro files, in a process of their own that can be stopped.
+"""Expanding xacro files, in a separate process that can be stopped.
 
 A xacro file is a program: its ``${…}`` are Python expressions, and one such as
 ``${9**9**9}`` never ends. Expand only those you trust.
@@ -120,7 +120,7 @@ def _reason(answer: Mapping[str, str]) -> str:
 
 
 def _warnings(stderr: str) -> list[str]:
-    """What xacro ignored or could not find; not where, and nothing about style."""
+    """Warnings on what xacro ignored or did not find, without places and style."""
     plain = re.sub(r"\x1b\[[0-9;]*m", "", stderr)
     lines = dict.fromkeys(line.strip() for line in plain.splitlines())
     return [

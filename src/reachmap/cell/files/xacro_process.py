@@ -19,7 +19,7 @@ from reachmap.errors import CellError
 
 
 class _Arguments(dict[str, str]):
-    """Arguments that remember which names were asked for."""
+    """Arguments that record which names were looked up."""
 
     def __init__(self, given: dict[str, str]) -> None:
         super().__init__(given)
@@ -38,7 +38,7 @@ class _Arguments(dict[str, str]):
 
 
 def main() -> None:
-    """Answer the request; what goes wrong is part of the answer."""
+    """Answer the request; failures are part of the answer."""
     request = json.load(sys.stdin)
     with contextlib.redirect_stdout(sys.stderr):
         _limit(resource.RLIMIT_CPU, request["cpu_s"])
@@ -116,7 +116,7 @@ def _takes() -> str:
 
 
 def _explained(error: Exception) -> dict[str, str]:
-    """Answer for a failure, by what lies at its bottom."""
+    """Answer for a failure, from its root cause."""
     causes = [error]
     while isinstance(cause := getattr(causes[-1], "exc", None), Exception):
         causes.append(cause)

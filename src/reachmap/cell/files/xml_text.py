@@ -1,4 +1,4 @@
-"""XML as robot descriptions write it, which is not always as the standard has it.
+"""XML as found in robot descriptions, which do not always follow the standard.
 
 Read as ROS reads it: a byte order mark or blank lines before the declaration, encodings
 other than UTF-8 where the declaration names them, prefixes that nobody bound

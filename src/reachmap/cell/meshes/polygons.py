@@ -1,4 +1,4 @@
-"""What the readers of mesh files share: their error, and polygons in triangles."""
+"""Shared by the readers of mesh files: their error, and triangulation of polygons."""
 
 from __future__ import annotations
 

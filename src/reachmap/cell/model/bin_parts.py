@@ -1,4 +1,4 @@
-"""What a bin is made of: bottom, walls, rim and the heap in it, in the bin frame."""
+"""The parts of a bin: bottom, walls, rim and the heap in it, in the bin frame."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What stands around the arm and hangs on it: camera, bodies, bin."""
+"""Bodies around the arm and attached to it: camera, bodies, bin."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The pick cycle after the grasp: the part in hand, the lift, where it goes, waits."""
+"""The pick cycle after the grasp: held part, lift, drop-offs, dwell times."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ Depth = Annotated[Coordinate, Field(ge=0)]
 
 
 class PartSpec(Record):
-    """The part that hangs on the tool from the grasp until its release."""
+    """The part held by the tool from the grasp until its release."""
 
     shape: Shape = Field(description="One primitive or mesh.")
     pose: PoseSpec = Field(PoseSpec(), description="Shape centre in the TCP frame.")

@@ -1,4 +1,4 @@
-"""Settings of the roadmap: which planners, how hard they try, how it is joined."""
+"""Settings of the roadmap: planners, their budgets, and how nodes are connected."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Few = Annotated[int, Field(ge=1, le=1000)]
 
 
 class RoadmapSpec(Record):
-    """How frames are connected to the scan configuration, and on what evidence not."""
+    """Search effort for connecting frames to the scan configuration."""
 
     planners: tuple[PlannerName, ...] = Field(
         ("LBKPIECE1", "RRTConnect"),

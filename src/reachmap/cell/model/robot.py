@@ -142,7 +142,7 @@ class MountSpec(Record):
 
     @property
     def lean_deg(self) -> float:
-        """How far z of the base leans from the vertical, towards the yaw [deg]."""
+        """Tilt of the base's z axis from the vertical, towards the yaw [deg]."""
         return {"pedestal": 0.0, "wall": 90.0, "ceiling": 180.0}[self.kind] + (
             self.tilt_deg
         )

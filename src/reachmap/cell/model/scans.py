@@ -94,7 +94,7 @@ CLEAR_RIM: Literal["clear_rim"] = "clear_rim"
 
 
 def word_or_length(value: object) -> str:
-    """Tag of what is a word, such as clear_rim, or a length: one message, not two."""
+    """Tag of a word, such as clear_rim, or a length: one message, not two."""
     return "word" if isinstance(value, str) else "length"
 
 
@@ -105,7 +105,7 @@ Approach = Annotated[
 
 
 class BinScanSpec(Record):
-    """The bin scan: test grasps inside the bin, and the pick they stand for."""
+    """The bin scan: test grasps inside the bin, and the pick they represent."""
 
     grid: tuple[Count, Count] = Field(
         (20, 14), description="Points along the bin's x and y."
@@ -185,7 +185,7 @@ class BinScanSpec(Record):
 
 
 class ToleranceSpec(Record):
-    """How far the bin may end up from where it is meant to stand."""
+    """Expected error of the bin's position and heading."""
 
     shift_m: Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)] = Field(
         0.03, description="In the plane [m]."

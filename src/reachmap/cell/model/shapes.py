@@ -1,6 +1,6 @@
-"""What each kind of shape is in numbers and words: sides, corners, triangles, text.
+"""Geometry of each kind of shape: sides, corners, triangles, text.
 
-The one place that tells boxes from cylinders; engines and pictures get numbers.
+The one place that distinguishes boxes from cylinders; engines and pictures get numbers.
 """
 
 from __future__ import annotations

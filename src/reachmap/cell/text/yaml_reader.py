@@ -1,4 +1,4 @@
-"""YAML text to plain data, remembering the line and column of every value.
+"""YAML text to plain data with the line and column of every value.
 
 Only what a cell file needs is read: mappings with text keys, lists and scalars of
 the YAML 1.2 core schema. Anchors, aliases, merge keys and all tags but units that the

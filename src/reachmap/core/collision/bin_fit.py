@@ -1,4 +1,4 @@
-"""Can a bin stand at a pose; which grasps do its walls deny to the tool itself."""
+"""Whether a bin fits at a pose, and which grasps its walls block for the tool alone."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ WHOLE = "bin"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BinContact:
-    """What a bin collides with.
+    """A collision of the bin.
 
     Attributes
     ----------
@@ -65,7 +65,7 @@ class BinContact:
 
 
 class BinFit:
-    """Checks poses of the bin against bodies that stand still and against the arm.
+    """Checks poses of the bin against static bodies and against the arm.
 
     A body may touch the bin from outside, as a table does that carries it, but not
     reach into it. The arm keeps the cell's safety margin, as in every plan.
@@ -120,7 +120,7 @@ class BinFit:
 
 
 class ToolFit:
-    """Checks what the arm's last joint carries against the bin, arm aside.
+    """Checks what the arm's last joint carries against the bin, without the arm.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What a camera sees: does anything stand between it and what it looks at."""
+"""Visibility: whether a body occludes what the camera looks at."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def camera_placement(robot: RobotModel, cell: Cell) -> tuple[int, FloatArray]:
 
 
 class Camera:
-    """A cell's camera, and the bodies that may stand in its way.
+    """A cell's camera, and the bodies that may occlude its view.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Is a configuration free; if not, which two bodies touch.
+"""Whether a configuration is free; if not, which two bodies touch.
 
 The truth is coal on the collision meshes with a safety margin on every pair. Beside it
 stands a ladder of checks with wider and wider margins, on convex hulls: a configuration
@@ -19,10 +19,10 @@ import numpy as np
 import pinocchio as pin
 
 from reachmap._typing import BoolArray, FloatArray, IntArray
-from reachmap.core.bystander import Bystander, guess_nothing
+from reachmap.core.bystander import Bystander, disable_cached_guesses
 from reachmap.core.collision.bodies import BodyGeometry
 from reachmap.core.collision.displacement import MotionBound
-from reachmap.core.collision.never_meet import PairMotion, pairs_that_never_meet
+from reachmap.core.collision.never_collide import PairMotion, pairs_that_never_collide
 from reachmap.core.collision.shapes import convex_hull
 from reachmap.core.robot.chain import SerialChain
 from reachmap.core.trace import EVERY, FREE, TOUCHING, Trace
@@ -44,7 +44,7 @@ class CollisionChecker:
     ----------
     robot : RobotModel
     bodies : BodyGeometry
-        Pairs that can never meet are removed from it.
+        Pairs that can never collide are removed from it.
     safety_margin_m : float
         Bodies closer than this count as touching.
     movable : collection of str
@@ -88,7 +88,7 @@ class CollisionChecker:
         self.safety_margin_m = safety_margin_m
         motion = PairMotion(robot, bodies)
         self.hulls = _with_convex_hulls(bodies.geometry)
-        proved = pairs_that_never_meet(
+        proved = pairs_that_never_collide(
             robot,
             self.hulls,
             motion,
@@ -142,7 +142,7 @@ class CollisionChecker:
         T_root_body: Mapping[str, FloatArray],
         shapes: Mapping[str, Any] | None = None,
     ) -> None:
-        """Put movable bodies elsewhere, by name and pose (4, 4).
+        """Move movable bodies, by name and pose (4, 4).
 
         Primitives may have another size there: ``shapes`` are those of coal, by name.
         """
@@ -161,7 +161,7 @@ class CollisionChecker:
         data = geometry.createData()
         for request, margin in zip(data.collisionRequests, margins, strict=True):
             request.security_margin = float(margin)
-        guess_nothing(data.collisionRequests)
+        disable_cached_guesses(data.collisionRequests)
         # The naive manager is the fastest on a cell; the sweep-and-prune one misses
         # collisions (reference: 75 of 10,500).
         manager = pin.BroadPhaseManager_NaiveCollisionManager(
@@ -313,7 +313,7 @@ class CollisionChecker:
         return pairs[0] if pairs else _NO_PAIR
 
     def blocking_pair_of_many(self, Q: FloatArray) -> int:
-        """The pair to blame when every configuration of a set collides.
+        """The pair reported when every configuration of a set collides.
 
         That is the pair of the configuration with the fewest pairs in collision:
         the one nearest to being free.

@@ -1,4 +1,4 @@
-"""How close bodies come on a path: the least distance, and between which two."""
+"""Clearance of a path: the smallest distance between two bodies, and which two."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from reachmap._typing import BoolArray, FloatArray, IntArray
-from reachmap.core.bystander import guess_nothing
+from reachmap.core.bystander import disable_cached_guesses
 from reachmap.core.collision.checker import CollisionChecker
 from reachmap.core.trace import Trace
 from reachmap.geometry import pieces
@@ -26,7 +26,7 @@ PIECE_RAD = 0.2
 
 
 def certain_clearance_m(clearance_m: FloatArray) -> FloatArray:
-    """What a clearance that was measured on a path is not below anywhere on it [m]."""
+    """Guaranteed lower bound of a path's clearance, from the measured one [m]."""
     allowed = np.maximum(TOLERANCE_M, TOLERANCE_SHARE * clearance_m)
     return np.asarray(clearance_m - allowed)
 
@@ -50,7 +50,7 @@ class ClearanceMeter:
         self._bodies_data = self._bodies.createData()
         self._hulls_data = self._hulls.createData()
         for data in (self._bodies_data, self._hulls_data):
-            guess_nothing(data.distanceRequests)
+            disable_cached_guesses(data.distanceRequests)
         pairs = self._bodies.collisionPairs
         self._has_mesh = np.array([self._differs(pair) for pair in pairs], bool)
         self._first = np.array([pair.first for pair in pairs], np.int64)
@@ -124,7 +124,7 @@ class ClearanceMeter:
     def _halve(
         self, Q: FloatArray, travel: FloatArray, place: FloatArray, d: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Look at the middle of each stretch that may be narrower somewhere.
+        """Measure at the middle of each piece that may be narrower somewhere.
 
         ``place`` counts pieces, the rows of ``d`` are distances there or bounds; both
         come back with rows in between.

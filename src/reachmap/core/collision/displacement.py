@@ -41,7 +41,7 @@ def displacement_bounds(model: Any, bodies: BodyGeometry) -> FloatArray:
 
 
 class MotionBound:
-    """Displacement along short straight motions, from where the robot really is.
+    """Displacement along short straight motions, from the actual configuration.
 
     The bounds R hold for the stretched-out arm. For a motion q ± sΔ, 0 ≤ s ≤ 1, a
     point X moves no further than ``‖J_X(q) Δ‖ + ½ (Σ|Δ_i|)(Σ R_j |Δ_j|)``: Taylor, with

@@ -1,4 +1,4 @@
-"""The part in hand as a body of the last joint."""
+"""The held part as a body of the last joint."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _COAXIAL_M = 1e-9
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class HeldPart:
-    """What hangs on the tool between grasp and release.
+    """The part that the tool holds between grasp and release.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""Bin and tool off from where the cell has them: their bodies moved, and how far."""
+"""Errors in the poses of bin and tool: their bodies moved, and how far."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Misplacement:
-    """Where bin and tool are in place of where the cell has them.
+    """Actual poses of bin and tool, which differ from those of the cell.
 
     Attributes
     ----------

@@ -51,7 +51,7 @@ def convex_hull(points: FloatArray) -> Any:
 
     The hull is scipy's: coal's own is a segmentation fault where there is none. Where
     a corner has more neighbours than coal can count (the tip of a fine cone), every
-    second of them is left out and the rest swollen until it is around all points.
+    second of them is left out and the rest inflated until it contains all points.
     """
     points = np.asarray(points, float)
     # Below a millionth of the size a body has no inside that an engine could use.
@@ -60,8 +60,8 @@ def convex_hull(points: FloatArray) -> Any:
         return None
     try:
         hull = ConvexHull(points)
-        while (left_out := _crowded(hull)).any():
-            hull = ConvexHull(_swollen(hull, ~left_out, points))
+        while (left_out := _excess_neighbours(hull)).any():
+            hull = ConvexHull(_inflated(hull, ~left_out, points))
     except QhullError:
         return None
     points = hull.points
@@ -74,8 +74,8 @@ def convex_hull(points: FloatArray) -> Any:
     return coal.Convex(vertices, triangles)
 
 
-def _crowded(hull: ConvexHull) -> BoolArray:
-    """Which points of a hull to leave out: of too many neighbours every second."""
+def _excess_neighbours(hull: ConvexHull) -> BoolArray:
+    """Hull points to drop: every second neighbour of a point that has too many."""
     edges = np.unique(
         hull.simplices[:, [0, 1, 1, 2, 2, 0, 1, 0, 2, 1, 0, 2]].reshape(-1, 2), axis=0
     )
@@ -87,8 +87,8 @@ def _crowded(hull: ConvexHull) -> BoolArray:
     return left_out
 
 
-def _swollen(hull: ConvexHull, kept: BoolArray, points: FloatArray) -> FloatArray:
-    """Some corners of a hull, moved outwards until their hull has all points inside."""
+def _inflated(hull: ConvexHull, kept: BoolArray, points: FloatArray) -> FloatArray:
+    """Some corners of a hull, scaled until their hull contains all points."""
     corners = hull.points[np.intersect1d(np.flatnonzero(kept), hull.vertices)]
     centre = corners.mean(axis=0)
     normal, offset = np.split(ConvexHull(corners - centre).equations, [3], axis=1)

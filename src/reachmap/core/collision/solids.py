@@ -1,4 +1,4 @@
-"""The cell as triangles with names, for pictures: what is shown is what is checked.
+"""The cell as named triangle meshes, for pictures: what is shown is what is checked.
 
 The shapes are the collision shapes, of links and of bodies alike, so a picture
 of two bodies in contact shows why a configuration was refused.

@@ -1,7 +1,7 @@
-"""Bodies at fixed places, and shapes that are tried among them one by one.
+"""Bodies at fixed poses, and shapes that are checked against them one by one.
 
-Where everything but one shape stands still, moving that shape costs microseconds: only
-bodies whose boxes it meets are looked at.
+Where everything but one shape is static, moving that shape costs microseconds: only
+bodies whose boxes it overlaps are checked.
 """
 
 from __future__ import annotations

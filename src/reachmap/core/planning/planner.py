@@ -18,7 +18,7 @@ import numpy as np
 
 from reachmap._typing import FloatArray
 from reachmap.cell.model.planner import PlannerSpec
-from reachmap.core.memo import remembered_part
+from reachmap.core.memo import memoized_part
 from reachmap.core.planning.motion import MotionChecker
 from reachmap.core.planning.ompl import Budget, FoundPath, OmplSearch
 from reachmap.core.planning.shortcut import shorten
@@ -109,7 +109,7 @@ class Planner:
         max_checks : int, optional
             Budget in state checks; default: the cell's.
         """
-        return remembered_part(
+        return memoized_part(
             "plan",
             lambda: self._plan(start, goals, seed, max_checks),
             self._spec_text,

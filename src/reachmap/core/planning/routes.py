@@ -22,7 +22,7 @@ from scipy.spatial import cKDTree
 
 from reachmap._typing import FloatArray, IntArray
 from reachmap.cell.model.roadmap import RoadmapSpec
-from reachmap.core.memo import remembered_part
+from reachmap.core.memo import memoized_part
 from reachmap.core.planning.motion import MotionChecker
 from reachmap.core.planning.planner import Planner
 from reachmap.core.planning.shortcut import cut_corners, skip_waypoints
@@ -239,7 +239,7 @@ def build_network(
             short = shorten_until(route, motions, rng, rough)
             return short, rng.bit_generator.state
 
-        short, rng.bit_generator.state = remembered_part(
+        short, rng.bit_generator.state = memoized_part(
             "shorten", compute, route, rng.bit_generator.state
         )
         return short
@@ -265,7 +265,7 @@ def build_network(
 
 
 def _network_of(routes: Sequence[FloatArray], motions: MotionChecker) -> RouteNetwork:
-    return remembered_part(
+    return memoized_part(
         "network", lambda: RouteNetwork.of(routes, motions), list(routes)
     )
 

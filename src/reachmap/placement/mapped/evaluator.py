@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from reachmap._typing import BoolArray, FloatArray
-from reachmap.core.memo import Memo, fingerprint, remembered
+from reachmap.core.memo import Memo, fingerprint, memoized
 from reachmap.placement.mapped.exact import (
     ALWAYS,
     BIN_PLACING,
@@ -226,7 +226,7 @@ class Prepared:
         seen = hashlib.sha256(self._is_open.tobytes()).hexdigest()
         return f"pose {known} {seen}"
 
-    def remembered(
+    def memoized(
         self, unit: tuple[Request, float], compute: Callable[[], dict[str, Any]]
     ) -> dict[str, Any]:
         """Score a pose, or take it over from a cell in which the score is the same."""
@@ -238,7 +238,7 @@ class Prepared:
         scene = self._placing.at(
             self._scene, self._placing.cell_at(self._scene.loaded, pose)
         )
-        return remembered(f"{self._key} {unit}", scene, compute)
+        return memoized(f"{self._key} {unit}", scene, compute)
 
     def scene_at(self, pose: Pose, grid: Grid) -> PlacedScene:
         """Scene with what is placed at a pose."""
@@ -254,7 +254,7 @@ class Prepared:
 
 def evaluate_unit(prepared: Prepared, unit: tuple[Request, float]) -> dict[str, Any]:
     """Score one pose, unless its bound is not above a number [percent]."""
-    return prepared.remembered(unit, partial(_evaluate, prepared, unit))
+    return prepared.memoized(unit, partial(_evaluate, prepared, unit))
 
 
 def _evaluate(prepared: Prepared, unit: tuple[Request, float]) -> dict[str, Any]:

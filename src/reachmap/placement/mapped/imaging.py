@@ -15,8 +15,8 @@ from reachmap.geometry import inverse_transform
 from reachmap.placement.mapped.viewpoints import (
     NOT_SEEN,
     camera_poses,
-    seen_from,
     view_of,
+    visibility_grades,
 )
 
 # Configurations nearer than this are the same to a planner.
@@ -117,7 +117,7 @@ def is_in_picture(
     assert cell.camera is not None
     view = view_of(cell.bin.inner, cell.bin_scan.layers)
     T_bin_camera = inverse_transform(T_base_bin) @ T_base_camera
-    return bool(seen_from(T_bin_camera[None], view, cell.camera)[0] < NOT_SEEN)
+    return bool(visibility_grades(T_bin_camera[None], view, cell.camera)[0] < NOT_SEEN)
 
 
 def _parking_configurations(
@@ -154,7 +154,7 @@ def _views(
     """
     view = view_of(inner, layers)
     T_bin_camera = camera_poses(view, camera.range_m)
-    missing = seen_from(T_bin_camera, view, camera)
+    missing = visibility_grades(T_bin_camera, view, camera)
     seen = missing < NOT_SEEN
     return T_bin_camera[seen], missing[seen]
 

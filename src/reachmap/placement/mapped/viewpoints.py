@@ -71,7 +71,9 @@ def camera_poses(view: View, range_m: tuple[float, float]) -> FloatArray:
     return np.asarray(T.reshape(-1, 4, 4))
 
 
-def seen_from(T_bin_camera: FloatArray, view: View, camera: CameraSpec) -> IntArray:
+def visibility_grades(
+    T_bin_camera: FloatArray, view: View, camera: CameraSpec
+) -> IntArray:
     """How little of a bin is missing from each picture, shape (n,).
 
     Parameters

@@ -14,7 +14,7 @@ from reachmap.errors import SettingsError
 from reachmap.geometry import rotation_from_quaternion_wxyz, transform_from_parts
 from reachmap.maps.bytes.to_json import json_ready
 from reachmap.maps.cycle.seconds import throughput_of
-from reachmap.ranking.answers.plausibility import plausibility_questions
+from reachmap.ranking.answers.plausibility import plausibility_warnings
 from reachmap.ranking.answers.ranked_list import RankedList
 from reachmap.ranking.lists.arrays import GraspList
 from reachmap.ranking.lookup.frames import place_grasps
@@ -70,7 +70,7 @@ def rank_list(
         ranking=ranking,
         asked=settings,
         header=_header(ranker, settings, ranking),
-        doubts=plausibility_questions(
+        doubts=plausibility_warnings(
             grasps,
             ranking,
             lambda other: ranker.rank_queries(queries_of(other), settings),

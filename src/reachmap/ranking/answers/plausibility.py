@@ -43,7 +43,7 @@ def matched_count(ranking: Ranking) -> int:
     return int((~np.isin(ranking.status, [*UNMATCHED])).sum())
 
 
-def plausibility_questions(
+def plausibility_warnings(
     grasps: GraspList, ranking: Ranking, rank: Callable[[GraspList], Ranking]
 ) -> tuple[str, ...]:
     """Ask about the mistake that explains why a list does not fit the map.

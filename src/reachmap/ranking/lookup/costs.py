@@ -17,7 +17,7 @@ from reachmap.ranking.lookup.matching import (
     NearestPoints,
     Queries,
     match_at,
-    worth_of,
+    tie_costs,
 )
 from reachmap.ranking.lookup.settings import ALIKE_STEPS
 from reachmap.ranking.lookup.table import GraspTable
@@ -123,13 +123,13 @@ def blended_terms(
     distance, point = tree.in_order(queries.points, neighbours + 1)
     weight = 1.0 / np.maximum(matches.distance, MIN_DISTANCE_M)
     total, blend = weight.copy(), phi * weight[:, None]
-    worth = worth_of(columns.costs())
+    tie_cost = tie_costs(columns.costs())
     # The matched point is one of the nearest; the others follow by distance.
     used = np.zeros(len(queries), np.int64)
     for column in range(point.shape[1]):
         other = (point[:, column] != matches.point) & (used < neighbours - 1)
         used += other
-        near = match_at(queries, table, point[:, column], distance[:, column], worth)
+        near = match_at(queries, table, point[:, column], distance[:, column], tie_cost)
         terms = columns.values[near.point, near.orientation]
         terms = np.where(np.isnan(terms), columns.worst, terms)
         weight = np.where(other, 1.0 / np.maximum(near.distance, MIN_DISTANCE_M), 0.0)

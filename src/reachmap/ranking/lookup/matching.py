@@ -171,18 +171,18 @@ def match(
     cost : array, shape (points, orientations)
         J of each test grasp, inf where unreachable; decides ties.
     """
-    worth = worth_of(cost)
+    tie_cost = tie_costs(cost)
     distance, point = tree.query(queries.points, 2)
-    matches = match_at(queries, table, point[:, 0], distance[:, 0], worth)
+    matches = match_at(queries, table, point[:, 0], distance[:, 0], tie_cost)
     if distance.shape[1] > 1:
         # Few grasps lie midway between points; only they are looked at again.
         midway = np.flatnonzero(distance[:, 1] - distance[:, 0] <= TIE_M)
         if midway.size:
-            _rematch(matches, midway, queries, table, tree, worth)
+            _rematch(matches, midway, queries, table, tree, tie_cost)
     return matches
 
 
-def worth_of(cost: FloatArray) -> FloatArray:
+def tie_costs(cost: FloatArray) -> FloatArray:
     """Costs as ties compare them: to twelve decimals, and never infinite.
 
     Rounded, costs that differ in the last digit count as equal. Below infinity, an
@@ -196,7 +196,7 @@ def match_at(
     table: GraspTable,
     point: IntArray,
     distance: FloatArray,
-    worth: FloatArray,
+    tie_cost: FloatArray,
 ) -> Matches:
     """Match each grasp among the orientations of a given test point.
 
@@ -207,13 +207,13 @@ def match_at(
     point : int array, shape (n,)
     distance : array, shape (n,)
         φ1 to that point [m].
-    worth : array, shape (points, orientations)
-        Costs from :func:`worth_of`.
+    tie_cost : array, shape (points, orientations)
+        Costs from :func:`tie_costs`.
     """
     cosines = _cosines(queries, table, point)
     first = np.argmax(cosines, axis=1)
     near = cosines >= _tie_limit(queries, table, point, first)[:, None]
-    orientation = np.argmin(np.where(near, worth[point], np.inf), axis=1)
+    orientation = np.argmin(np.where(near, tie_cost[point], np.inf), axis=1)
     return Matches(
         point=point.copy(),
         orientation=orientation,
@@ -247,11 +247,11 @@ def match_past(
     if not rows.size:
         return matches
     values = {name: getattr(matches, name).copy() for name in Matches.__slots__}
-    some, worth = queries.take(rows), worth_of(cost)
+    some, tie_cost = queries.take(rows), tie_costs(cost)
     distance, point = tree.in_order(some.points, PASSED_POINTS)
     open_ = np.ones(len(rows), bool)
     for column in range(point.shape[1]):
-        near = match_at(some, table, point[:, column], distance[:, column], worth)
+        near = match_at(some, table, point[:, column], distance[:, column], tie_cost)
         fits = open_ & ~left_out[near.point, near.orientation]
         for name, column_of in values.items():
             column_of[rows[fits]] = getattr(near, name)[fits]
@@ -284,12 +284,12 @@ def _rematch(
     queries: Queries,
     table: GraspTable,
     tree: NearestPoints,
-    worth: FloatArray,
+    tie_cost: FloatArray,
 ) -> None:
     """Match rows again over all points that tie in φ1."""
     part = queries.take(rows)
     distance, point, near = _tied_points(part, table, tree)
-    flat = np.where(near, worth[point], np.inf).reshape(len(rows), -1)
+    flat = np.where(near, tie_cost[point], np.inf).reshape(len(rows), -1)
     column, orientation = np.divmod(np.argmin(flat, axis=1), near.shape[2])
     every = np.arange(len(rows))
     matches.point[rows] = point[every, column]

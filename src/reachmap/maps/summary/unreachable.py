@@ -20,7 +20,7 @@ REMEDIES = {
 }
 
 
-def why_nothing(record: WorkspaceMap | BinMap) -> str:
+def why_unreachable(record: WorkspaceMap | BinMap) -> str:
     """Why a map has no reachable test frame; "" where it has one."""
     return most_likely_cause(*frames_of(record), record.body_pairs)
 

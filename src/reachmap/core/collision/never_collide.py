@@ -1,4 +1,4 @@
-"""Pairs of bodies that can never meet, proved by subdivision.
+"""Pairs of bodies that can never collide, proved by subdivision.
 
 Whether two bodies touch depends only on the joints between them. Where these are one
 or two, the whole range of motion is covered with boxes: at the middle of a box the
@@ -27,7 +27,7 @@ MAX_JOINTS = 2
 MAX_BOXES = 3000
 
 
-def pairs_that_never_meet(
+def pairs_that_never_collide(
     robot: RobotModel,
     hulls: Any,
     motion: PairMotion,
@@ -59,7 +59,7 @@ def pairs_that_never_meet(
     return tuple(
         (pair.first, pair.second)
         for index, pair in enumerate(hulls.collisionPairs)
-        if not left_out & {pair.first, pair.second} and prover.never_meets(index)
+        if not left_out & {pair.first, pair.second} and prover.never_collide(index)
     )
 
 
@@ -118,7 +118,7 @@ class _Prover:
         self.motion, self.margin_m = motion, margin_m
         self.data, self.geometry_data = self.model.createData(), geometry.createData()
 
-    def never_meets(self, index: int) -> bool:
+    def never_collide(self, index: int) -> bool:
         joints, bound = self.motion.between(self.geometry.collisionPairs[index])
         if not 0 < len(joints) <= MAX_JOINTS:
             return False
