@@ -1,7 +1,7 @@
-"""What is on the disk under a name that a user gave.
+"""File-system queries for names given by users.
 
-``Path.exists`` and its kin raise for names that are too long, in folders that may not
-be looked into, and for links that lead to themselves; for a user nothing is there.
+``Path.exists`` and others raise for names that are too long, in folders without
+permission, and for links to themselves; for a user such files do not exist.
 """
 
 from __future__ import annotations
@@ -13,17 +13,17 @@ from pathlib import Path
 
 
 def is_there(path: Path) -> bool:
-    """Whether something of that name can be seen."""
+    """Whether anything of that name exists and is accessible."""
     return os.path.exists(path)  # noqa: PTH110
 
 
 def is_file(path: Path) -> bool:
-    """Whether a file of that name can be seen."""
+    """Whether an accessible file of that name exists."""
     return os.path.isfile(path)  # noqa: PTH113
 
 
 def is_folder(path: Path) -> bool:
-    """Whether a folder of that name can be seen."""
+    """Whether an accessible folder of that name exists."""
     return os.path.isdir(path)  # noqa: PTH112
 
 
@@ -60,7 +60,7 @@ def is_text(name: str) -> bool:
 
 
 def read_up_to(path: Path | str, limit: int) -> bytes | None:
-    """Contents of a file or a pipe; None where there are more bytes than that.
+    """Contents of a file or a pipe; None if it exceeds the limit.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""The errors a user can meet, each with the exit code of the command line.
+"""The errors a user may see, each with the exit code of the command line.
 
 ::
 
@@ -25,7 +25,7 @@ from typing import ClassVar
 
 
 class ReachmapError(Exception):
-    """Root of the family; ``lines`` holds one sentence per mistake.
+    """Base class; ``lines`` holds one sentence per mistake.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ class OutputError(ReachmapError, OSError):
 
 
 class NoRoomError(OutputError):
-    """The disk, a quota or a limit on file sizes is full; a scan keeps its store."""
+    """The disk, a quota or a file-size limit is full; a scan keeps its journal."""
 
 
 class MissingExtraError(ReachmapError, ImportError):
@@ -77,7 +77,7 @@ class MissingExtraError(ReachmapError, ImportError):
 
 
 class GateFailedError(ReachmapError):
-    """The work is done, but a gate the user asked for did not hold."""
+    """The work is done, but a gate requested by the user failed."""
 
     exit_code: ClassVar[int] = 1
 
@@ -89,6 +89,6 @@ class IncompleteError(ReachmapError):
 
 
 class EngineError(ReachmapError, RuntimeError):
-    """A planner, solver or worker broke; this is a defect, not wrong input."""
+    """A planner, solver or worker failed; this is a defect, not wrong input."""
 
     exit_code: ClassVar[int] = 70

@@ -176,7 +176,7 @@ def direction_angle(a: FloatArray, b: FloatArray) -> FloatArray:
 
 
 def upright_rotation(R_world_frame: FloatArray) -> FloatArray:
-    """Rotation that stands a frame upright in the world, its heading kept.
+    """Rotation that turns a frame upright in the world, keeping its heading.
 
     The upright frame has z along the world's vertical. Its x axis is the horizontal
     direction of the frame's own x, or square to that of its y where y lies flatter: a

@@ -1,7 +1,7 @@
 """The artefacts: records, their HDF5 form, provenance, checksums.
 
-A file under its final name is complete, and what is read from it was checked from its
-bytes up to what its numbers say to each other.
+A file under its final name is complete, and everything read from it was checked, from
+its bytes up to the consistency of its numbers.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""How sure "no path found" is: a share that was counted on cells with known answers."""
+"""Confidence in "no path found", calibrated on cells with known answers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How records show themselves: in a line, in a notebook, as a picture, in xarray."""
+"""Display of records: as a line, in a notebook, as a picture, in xarray."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ DRAWING: Final = "reachmap.tools.plot"
 
 
 class Shown:
-    """What a map offers to somebody who looks at it interactively."""
+    """Mixin that displays a map interactively."""
 
     __slots__ = ()
 
@@ -99,7 +99,7 @@ class ShownBin(Shown):
 
 
 def facts_of(record: Any) -> list[tuple[str, str]]:
-    """What one wants to know first of a map, as name and text."""
+    """Headline facts of a map, as name and text."""
     kind = type(record).__name__
     facts = {"BinMap": _bin, "WorkspaceMap": _workspace, "BinPlacement": _placement}
     return [

@@ -1,4 +1,4 @@
-"""Parts of the maps that a file holds as a whole or not at all."""
+"""Optional parts of the maps, each stored completely or not at all."""
 
 from __future__ import annotations
 
@@ -140,7 +140,7 @@ class Effort:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BestPaths:
-    """The path that a line would run to each test grasp, of whatever origin.
+    """The path to execute to each test grasp, whatever its origin.
 
     Attributes
     ----------
@@ -163,7 +163,7 @@ class BestPaths:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ApproachTimes:
-    """Time optima of the straight ways in and out.
+    """Time optima of the straight approaches and retreats.
 
     Attributes
     ----------
@@ -180,7 +180,7 @@ class ApproachTimes:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Margins:
-    """How far the best path and its goal stay from what would end them.
+    """Margins of the best path and its goal: clearance, joint limits, singularity.
 
     Attributes
     ----------
@@ -230,7 +230,7 @@ class StageStatus(IntEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Cycle:
-    """What follows the grasp until the robot is back.
+    """The stages from the grasp until the robot is back.
 
     Attributes
     ----------

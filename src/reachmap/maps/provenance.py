@@ -1,4 +1,4 @@
-"""Where an artefact comes from, and how its run went."""
+"""Provenance of an artefact, and the record of its run."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def package_versions(names: Sequence[str] = PACKAGES) -> dict[str, str]:
 def collect_provenance(
     loaded: LoadedCell, *, settings: Mapping[str, Any], source_sha256: str = ""
 ) -> Provenance:
-    """Collect what an artefact is made from, as it is stored.
+    """Collect the provenance of an artefact, as stored.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ def collect_provenance(
 
 
 class RunClock:
-    """Takes down how a run went, phase by phase.
+    """Records the times of a run, phase by phase.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""What the artefacts hold, as frozen records of read-only arrays."""
+"""Contents of the artefacts, as frozen records of read-only arrays."""
 
 from __future__ import annotations
 
@@ -294,7 +294,7 @@ class BinMap(ShownBin):
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class BinPlacement(Shown):
-    """Where the bin goes, the configuration it is imaged from, and the runners-up.
+    """Placement of the bin, the configuration that images it, and the runners-up.
 
     Candidates are rows: the chosen one is row ``chosen``.
 

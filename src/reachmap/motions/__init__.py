@@ -1,1 +1,1 @@
-"""Verified motions on their way out of a map: timed, and written for controllers."""
+"""Verified motions of a map: timed, and exported for controllers."""

@@ -27,7 +27,7 @@ PERIOD_S: Final = 0.02
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Origin:
-    """What exported motions come from; it stands at the head of every file.
+    """Origin of exported motions, written at the head of every file.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""Motions for live grasps out of a bin map: a stored path and a verified last piece.
+"""Motions for live grasps from a bin map: a stored path and a verified last segment.
 
 Nothing is planned. A grasp takes the stored path to a test grasp near it; the arm goes
 on with the same branch of its kinematics to the grasp itself, by a straight joint
@@ -63,7 +63,7 @@ ROLL_STEPS: Final = 12
 
 @dataclass(frozen=True, kw_only=True, eq=False)  # no slots: it keeps its times
 class ServedMotion:
-    """What the library has for one grasp.
+    """A motion to one grasp from the library.
 
     Attributes
     ----------
@@ -224,7 +224,7 @@ class MotionLibrary:
         return None
 
     def _near(self, query: Queries) -> list[tuple[int, int]]:
-        """Point and orientation of test grasps with a path, the nearest first."""
+        """Point and orientation of test grasps with a path, nearest first."""
         table = self.table
         away = np.linalg.norm(table.points - query.points[0], axis=1)
         points = np.argsort(away, kind="stable")[:NEAR_POINTS]
@@ -299,7 +299,7 @@ class MotionLibrary:
     def _bring(
         self, place: tuple[int, int], T: FloatArray, q: FloatArray, *, check: bool
     ) -> ServedMotion | None:
-        """Bring the path of a test grasp to a pose and configuration near it."""
+        """Extend the path of a test grasp to a pose and configuration near it."""
         planned, _ = way_points(self._map, int(self._rows[place]))
         level = self._level(place)
         scene, approaches = self.scenes[level], self._approaches[level]

@@ -1,1 +1,1 @@
-"""Heaps of parts in a bin, and picking them to the end."""
+"""Heaps of parts in a bin, and simulated emptying."""

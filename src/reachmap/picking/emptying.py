@@ -1,4 +1,4 @@
-"""Picking a heap to the end: which parts come out, in what order, and which stay."""
+"""Simulated emptying: which parts are picked, in what order, and which remain."""
 
 from __future__ import annotations
 

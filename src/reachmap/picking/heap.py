@@ -1,6 +1,6 @@
-"""A heap of parts in a bin: dropped one by one onto what lies there.
+"""A heap of parts in a bin, dropped one by one.
 
-No dynamics: a part comes to rest on one of its sides, leaning as the surface under it
+No dynamics: a part comes to rest on one of its sides, tilted as the surface under it
 does, touches it and does not sink in. That gives heaps their tilts, holes and parts
 that cover each other, and needs no more than a map of heights.
 """
@@ -29,7 +29,7 @@ COVERED_SHARE = 0.25
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Heap:
-    """Parts in a bin, in the order in which they fell. In the bin frame.
+    """Parts in a bin, in the order in which they were dropped. In the bin frame.
 
     Attributes
     ----------
@@ -99,7 +99,7 @@ def drop_heap(
 def _resting(
     part: tuple[float, float, float], rng: np.random.Generator
 ) -> tuple[float, float, float]:
-    """Sides of a part as it lies: flat sides more often, by area over height."""
+    """Sides of a resting part, weighted by area over height: flat ones are likelier."""
     a, b, c = part
     lying = np.array([(a, b, c), (b, c, a), (a, c, b)])
     weight = lying[:, 0] * lying[:, 1] / lying[:, 2]
@@ -109,7 +109,7 @@ def _resting(
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Rest:
-    """How a part may come to rest: where, and the cells of the map under it."""
+    """A possible resting pose of a part, and the height-map cells under it."""
 
     position: FloatArray
     normal: FloatArray
@@ -163,7 +163,7 @@ class _Surface:
         sides: tuple[float, float, float],
         rng: np.random.Generator,
     ) -> tuple[_Rest, list[int]] | None:
-        """Drop a part, which rolls to the lowest of some places; None: no room.
+        """Drop a part into the lowest of some random poses; None if there is no room.
 
         With the parts on top until now that it covers.
         """
@@ -232,7 +232,7 @@ class _Surface:
         return found[0], found[1]
 
     def _covered(self, rest: _Rest) -> list[int]:
-        """Parts on top until now that a new one covers."""
+        """Parts so far uncovered that a new one covers."""
         owners, cells = np.unique(self._owner[rest.under], return_counts=True)
         return [
             owner

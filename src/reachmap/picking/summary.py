@@ -1,4 +1,4 @@
-"""How far heaps were emptied, and where what stays lies."""
+"""Summary of emptied heaps, and where the remaining parts lie."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class HeapSummary:
 def summarise_heap(
     bin_map: BinMap, heap: Heap, emptied: Emptied, outside: BoolArray, seed: int
 ) -> HeapSummary:
-    """Count what was picked and what stays.
+    """Count picked and remaining parts.
 
     Parameters
     ----------

@@ -1,1 +1,1 @@
-"""Where the bin goes, and the configuration it is imaged from."""
+"""Placement of the bin, and the configuration that images it."""

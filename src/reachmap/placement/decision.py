@@ -1,4 +1,4 @@
-"""What was decided: by the paper's rule, as told, or by a search."""
+"""The decision on a placement: by the paper's rule, as given, or by a search."""
 
 from __future__ import annotations
 
@@ -99,7 +99,7 @@ def decide_by_paper(problem: PlacementProblem) -> Decision:
 
 
 def decide_as_given(problem: PlacementProblem, pose: Pose) -> Decision:
-    """Score a pose that the user has in mind, and the paper's beside it.
+    """Score a pose given by the user, and the paper's for comparison.
 
     Raises
     ------
@@ -155,14 +155,14 @@ def paper_pose(problem: PlacementProblem) -> Pose | None:
 
 
 def nowhere(problem: PlacementProblem, table: CandidateTable) -> str:
-    """Say that the bin can stand nowhere, with the reasons in a table."""
+    """Error that the bin fits nowhere, with the reasons of a table."""
     reasons = sorted({reason for reason in table.reasons() if reason})
     why = f" ({'; '.join(reasons[:4])})" if reasons else ""
     return f"{problem.loaded.source}: the bin can stand nowhere in the region{why}"
 
 
 def why_no_place(problem: PlacementProblem, decision: Decision) -> str:
-    """Say why no pose serves a single test frame; "" where one does."""
+    """Reason why no pose reaches a single test frame; "" where one does."""
     best = decision.table.rows[decision.ranked[0]]
     if best.score is None or best.score.score > 0.0:
         return ""
@@ -183,7 +183,7 @@ def why_no_place(problem: PlacementProblem, decision: Decision) -> str:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Outcome:
-    """What becomes the artefact.
+    """The final decision, from which the artefact is made.
 
     Attributes
     ----------
@@ -241,7 +241,7 @@ def settle(problem: PlacementProblem, decision: Decision) -> Outcome:
 
 
 def _from_scan(candidate: Candidate, scan: ScanChoice) -> Candidate:
-    """A candidate as it is reached from another scan configuration."""
+    """A candidate scored from another scan configuration."""
     worst = candidate.worst
     if worst is not None and candidate.score is not None:
         worst = max(worst + scan.score.score - candidate.score.score, 0.0)

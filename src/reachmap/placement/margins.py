@@ -1,4 +1,4 @@
-"""How far a bin may be off its pose before it is served much worse."""
+"""How far a bin may be off its pose before its score drops."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is asked of a placement, and what can be said of single poses."""
+"""The problem of placing a bin, and checks of single poses."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PlacementProblem:
-    """What is asked: a cell, its workspace map, and where the bin may stand.
+    """A cell, its workspace map, and where the bin may stand.
 
     Attributes
     ----------
@@ -131,7 +131,7 @@ class PlacementProblem:
     def can_be_imaged(self, pose: Pose) -> bool:
         """Whether some scan configuration, or the one that stays, images the bin.
 
-        A camera on the tool is taken at its word by whoever keeps the configuration.
+        Where the configuration is kept, a camera on the tool is not checked.
         """
         if self.keep_scan and self.still_camera is None:
             return True

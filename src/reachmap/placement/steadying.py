@@ -1,4 +1,4 @@
-"""Among good poses the one that stays good when the bin ends up a little off it."""
+"""Choice among good poses of the one that tolerates a misplaced bin best."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The worst that becomes of a pose when the bin ends up a little off it."""
+"""Worst case of a pose when the bin is slightly misplaced."""
 
 from __future__ import annotations
 
@@ -112,7 +112,7 @@ def worst_case(
     assert candidate.score is not None
     own = candidate.score.score
     poses = [moved_by(candidate.pose, offset) for offset in tolerance.offsets()]
-    # Whether the bin can stand somewhere costs next to nothing, so more is asked.
+    # Whether the bin fits somewhere is cheap to check, so more poses are checked.
     possible = [
         is_possible(pose) and is_possible(moved_by(candidate.pose, other))
         for pose, other in zip(poses, tolerance.mirrored(), strict=True)

@@ -1,4 +1,4 @@
-"""Which pictures and tables an artefact gives, and what they are called."""
+"""The pictures and tables of each artefact, and their names."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which approach directions and rolls work where in the bin, and why others do not.
+"""Approach directions and rolls that are reached in the bin, and why others are not.
 
 Each point carries a sunburst: rings are tilts, straight down in the middle; sectors
 are the directions the tool comes from; each sector is divided into the rolls about

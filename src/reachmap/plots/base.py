@@ -1,4 +1,4 @@
-"""The place of an arm from above: what each place promises, and the chosen one."""
+"""A robot placement from above: the bound at each place, and the chosen one."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ LINE = 0.19
 
 @drawing()
 def draw_base(placement: BasePlacement, percent_map: PercentMap = "RdYlGn") -> Figure:
-    """Draw what every place promises, and where the arm goes.
+    """Draw the bound at every place, and the chosen base pose.
 
     Parameters
     ----------

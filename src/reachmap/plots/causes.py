@@ -115,7 +115,7 @@ def _short(pair: str) -> str:
 
 
 def _end_name(end: CycleEnd) -> str:
-    """The bodies in the way of a stage, or what became of it."""
+    """The bodies in the way of a stage, or its outcome."""
     return f"{end.stage}: {end.pair or end.status}"
 
 

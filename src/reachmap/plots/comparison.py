@@ -60,7 +60,7 @@ class MapChange:
     before, after : array, shape (nz, ny, nx)
         Percent, NaN where a map has no attempt.
     significant : bool array, same shape
-        Squares whose change is more than chance.
+        Squares whose change is significant.
     names : (str, str)
         What the two maps are called.
     headline : str
@@ -179,7 +179,7 @@ def draw_comparison(
 def _draw_change(
     axes: Axes, maps: MapChange, level: int, scale_in: float, *, line: float = 1.6
 ) -> QuadMesh:
-    """Draw the signed change; frame what is more than chance."""
+    """Draw the signed change; frame the significant squares."""
     mesh = draw_squares(
         axes,
         maps.x,
@@ -329,7 +329,7 @@ def draw_small_multiples(
     changes : sequence of MapChange
         Of the first map to each of the others.
     significant : sequence of bool
-        Which changes are more than chance.
+        Which changes are significant.
     percent_map : str
     """
     most = max(changes, key=lambda c: float(np.nanmax(np.abs(c.change), initial=0.0)))

@@ -358,7 +358,7 @@ def _put_legend(figure: Figure, handles: list[Line2D], top: float) -> None:
 def _put_words(
     figure: Figure, placement: BinPlacement, left: float, top: float
 ) -> None:
-    """Write the margins, and why places are out of the question, from (left, top)."""
+    """Write the margins, and why places are excluded, from (left, top)."""
     excluded = Counter(reason for reason in placement.reason if reason)
     tested = int(np.sum(placement.exact > 0))
     margins = _margins(placement)

@@ -29,7 +29,7 @@ LABEL = 14
 
 @drawing()
 def draw_main_effects(study: Study, objective: int) -> Figure:
-    """One panel per parameter: the mean over all else, with its 95 % interval.
+    """One panel per parameter: the mean over the others, with its 95 % interval.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""A study as a whole: every variant across its parameters, and what is traded off."""
+"""A study as a whole: every variant across its parameters, and trade-offs."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def _oriented(study: Study, columns: list[int]) -> FloatArray:
 
 @drawing()
 def draw_pareto(study: Study, first: int, second: int) -> Figure:
-    """Two objectives against each other, with the variants that nothing betters.
+    """Two objectives against each other, with the Pareto-optimal variants.
 
     Parameters
     ----------
@@ -182,7 +182,7 @@ def draw_parallel(
 def draw_interactions(
     study: Study, objective: int, percent_map: PercentMap = "RdYlGn"
 ) -> Figure:
-    """Mean of an objective over every two parameters, all else averaged.
+    """Mean of an objective over every two parameters, averaged over the rest.
 
     Where rows of squares have the same pattern, the two do not depend on each other.
 

@@ -1,1 +1,1 @@
-"""A run as one page that can be sent to somebody."""
+"""The report of a run as one self-contained page."""

@@ -1,4 +1,4 @@
-"""The headline: the questions of a cell designer, answered as far as they can be."""
+"""The headline: answers to the questions of a cell designer, as far as possible."""
 
 from __future__ import annotations
 
@@ -113,7 +113,7 @@ def _share(run: RunFolder) -> Tile:
 
 
 def _clearance(run: RunFolder) -> Tile | None:
-    """What is left of the share where paths must keep a distance."""
+    """Reachability where paths must keep a clearance."""
     shares = () if run.bin_map is None else clearance_shares(run.bin_map)
     if not shares:
         return None

@@ -1,4 +1,4 @@
-"""What a report is made of: headings, paragraphs, tables, figures; HTML comes later.
+"""Building blocks of a report: headings, paragraphs, tables, figures.
 
 Sections build these records; the templates beside this module turn them into a page,
 and escape every text on the way.
@@ -136,7 +136,7 @@ def table(
 
 
 def facts(pairs: Iterable[tuple[str, object]]) -> Table | None:
-    """Names and what is said of them; those without anything to say are left out."""
+    """Table of names and values, without empty ones."""
     rows = [(Strong(name), said) for name, said in pairs if str(said)]
     return table((), rows, "<<", kind="facts") if rows else None
 

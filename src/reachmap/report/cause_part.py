@@ -1,4 +1,4 @@
-"""The section on failures: states of the test frames, and what is in the way."""
+"""The section on failures: states of the test frames, and bodies in the way."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ PAIRS_SHOWN = 8
 
 
 def cause_section(maps: dict[str, WorkspaceMap | BinMap]) -> Section:
-    """Say of each map why its test frames are not reached.
+    """Explain for each map why its test frames are not reached.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The section on the cell: what it is made of, and how it looks."""
+"""The section on the cell: its description and its picture."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a pick takes, where its seconds go, and where cycles end early."""
+"""Duration of a pick by stage, and where cycles end early."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a run has left in its folder: artefacts, ranked lists, a validation."""
+"""The results in a run's folder: artefacts, ranked lists, a validation."""
 
 from __future__ import annotations
 
@@ -39,14 +39,14 @@ Read = TypeVar("Read")
 
 
 def usual_files(folder: Path) -> list[Path]:
-    """Where the results of a run are looked for, there or not."""
+    """Paths where results of a run are expected, existing or not."""
     names = [name for _, name, _ in ARTEFACTS.values()]
     return [folder / name for name in (*names, *(name for name, _ in LISTS.values()))]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunFolder:
-    """The results of a run, as far as they are there.
+    """The results of a run that were found.
 
     Attributes
     ----------
@@ -92,7 +92,7 @@ class RunFolder:
 
 
 class _Reader:
-    """Reads what is there, and takes down what is not."""
+    """Reads the results, and records what is missing."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -140,7 +140,7 @@ class _Reader:
 
 
 def _without(line: str, path: Path) -> str:
-    """Make a message tell the name of a file, not where it lies on this machine."""
+    """Reduce the path of a file in a message to its name."""
     return line.replace(str(path), path.name)
 
 
@@ -155,7 +155,7 @@ def _read_json(path: Path) -> Any:
 
 
 def read_run_folder(folder: Path) -> RunFolder:
-    """Read a run; what is missing or damaged is noted and left out.
+    """Read a run; missing or damaged files are recorded and left out.
 
     Parameters
     ----------

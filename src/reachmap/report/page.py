@@ -36,7 +36,7 @@ CONTENTS = {
 
 
 def report_page(run: RunFolder, cell: LoadedCell | str) -> str:
-    """Write a run as one page without any reference to another file.
+    """Render a run as one page without references to other files.
 
     Parameters
     ----------

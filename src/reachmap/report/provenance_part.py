@@ -1,4 +1,4 @@
-"""The section on settings and provenance: enough to make everything again."""
+"""The section on settings and provenance: enough to reproduce everything."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ QUOTE = '"'
 
 
 def origin_section(run: RunFolder) -> Section:
-    """Say of every artefact how it was made."""
+    """Show how every artefact was made."""
     parts = []
     for role, record in run.artefacts.items():
         parts += [Heading(run.files[role]), _facts(record)]

@@ -1,4 +1,4 @@
-"""Ranked grasp lists as rows; what a list from elsewhere lacks is left empty."""
+"""Ranked grasp lists as rows; missing values stay empty."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def ranked_rows(document: Mapping[str, Any]) -> list[RankedRow]:
 
 
 def weights_of(document: Mapping[str, Any]) -> list[float]:
-    """Weights of the terms of J, as far as the list tells them."""
+    """Weights of the terms of J, if the list has them."""
     weights = document["reachmap"].get("weights")
     if not isinstance(weights, list):
         return []

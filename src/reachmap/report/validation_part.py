@@ -1,4 +1,4 @@
-"""The section on the validation: what the map said, and what planning found."""
+"""The section on the validation: predictions of the map against planning."""
 
 from __future__ import annotations
 

@@ -16,7 +16,7 @@ SOURCES = ("bin", "camera", "tool")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ErrorSize:
-    """How far something is off.
+    """Size of a pose error.
 
     Attributes
     ----------
@@ -66,7 +66,7 @@ class Errors:
 
 
 def unit_errors(count: int, seed: int) -> FloatArray:
-    """Directions of errors at random, every second one against the one before.
+    """Random directions of errors in antithetic pairs.
 
     Returns
     -------
@@ -76,7 +76,7 @@ def unit_errors(count: int, seed: int) -> FloatArray:
     rng = np.random.default_rng(seed)
     half = rng.normal(size=(-(-count // 2), len(SOURCES), 2, 3))
     half /= np.linalg.norm(half, axis=-1, keepdims=True)
-    # What an error costs is nearly linear in it, so that pairs cancel most of the luck.
+    # The effect of an error is nearly linear, so pairs cancel most of the variance.
     return np.stack([half, -half], axis=1).reshape(-1, *half.shape[1:])[:count]
 
 
@@ -86,7 +86,7 @@ def misplacement(
     T_base_bin: FloatArray,
     T_base_camera: FloatArray | None,
 ) -> Misplacement:
-    """What errors of given directions move.
+    """Misplacement caused by errors of given directions.
 
     Parameters
     ----------

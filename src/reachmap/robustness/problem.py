@@ -1,4 +1,4 @@
-"""A bin map and errors, and what becomes of its best paths."""
+"""The best paths of a bin map under errors: certified or replayed."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ from reachmap.runtime.options import RunOptions
 from reachmap.runtime.progress import Progress
 from reachmap.runtime.run import run
 
-# Small enough that workers end together.
+# Small enough that workers finish at about the same time.
 PATHS_PER_UNIT = 50
 GraspPlace = tuple[int, int, int, int]
 

@@ -1,4 +1,4 @@
-"""Stored paths in cells that are off: proved free, or replayed there.
+"""Stored paths in perturbed cells: proved free, or replayed.
 
 A path is proved where the bodies that errors move keep further apart on it than they
 are moved: by the clearance that the map holds, or else by the clearance of these bodies
@@ -66,7 +66,7 @@ class Replay:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PerturbedCell:
-    """A unit of work: some paths of a filling in one cell that is off.
+    """A unit of work: some paths of a filling in one perturbed cell.
 
     Attributes
     ----------

@@ -1,1 +1,1 @@
-"""Units of work: run, kept, resumed, shared out over workers and machines."""
+"""Units of work: run, stored, resumed, distributed over workers and machines."""

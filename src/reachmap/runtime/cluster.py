@@ -1,4 +1,4 @@
-"""Units on a Dask cluster: one of this machine, or one that is there already."""
+"""Units on a Dask cluster: a local one, or one that is already running."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Payloads as JSON text, bit for bit: what a line of the store holds.
+"""Payloads as JSON text, bit for bit, as stored in lines of the journal.
 
 An array is written as the base64 of its little-endian bytes with dtype and shape, a
 float that is not finite as Python's JSON does. NumPy scalars come back as Python

@@ -64,7 +64,7 @@ def open_pool(options: RunOptions) -> Iterator[Pool]:
 
 
 class InProcess(Executor):
-    """Does each task at once, in this process; for ``-j 1``, debugging, coverage."""
+    """Runs each task immediately in this process; for ``-j 1``, debugging, coverage."""
 
     def submit(
         self, fn: Callable[P, R], /, *args: P.args, **kwargs: P.kwargs

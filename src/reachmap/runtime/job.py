@@ -1,4 +1,4 @@
-"""What is computed, and the part of it that runs in a worker: any process, anywhere.
+"""Definition of the work, and the part of it that runs in a worker.
 
 A *work* is a scan apart from where and how often it is interrupted; a *job* is what
 workers must know of it. A worker keeps what it built for a job under the job's key,
@@ -139,7 +139,7 @@ class Stages(Protocol):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Work:
-    """What a scan computes, apart from where and how often it is interrupted.
+    """What a scan computes, independent of workers and interruptions.
 
     Attributes
     ----------
@@ -209,7 +209,7 @@ class Measure:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Reply:
-    """Result of a unit: its payload as text, or the text of what went wrong."""
+    """Result of a unit: its payload as text, or the text of the error."""
 
     index: int
     text: str
@@ -296,7 +296,7 @@ def forget(key: str) -> None:
 def _prepared(ticket: Ticket) -> tuple[Job, Any]:
     if ticket.key not in _states:
         if (job := ticket.job) is None:
-            raise EngineError("a worker was not told what to do")
+            raise EngineError("a worker has not received its job")
         _check_packages(ticket.packages)
         _states[ticket.key] = job, job.prepare(job.context)
         while len(_states) > KEPT_JOBS:

@@ -1,4 +1,4 @@
-"""The text of a store, and reading it: sealed lines, a header, one line a unit.
+"""The text of a journal and its reader: sealed lines, a header, one line per unit.
 
 ::
 
@@ -161,7 +161,7 @@ class Entries:
     ----------
     header : Header
     damaged : int
-        Number of complete lines that were passed over.
+        Number of complete lines that were skipped.
     end : int
         Length of the file up to the last complete line [bytes].
 

@@ -1,4 +1,4 @@
-"""Joining the journals of shards into the artefact a single run would have made."""
+"""Merging the journals of shards into the artefact of a single run."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How a command computes: one object, built once and passed whole."""
+"""Options on how a command computes: one object, built once and passed whole."""
 
 from __future__ import annotations
 

@@ -266,7 +266,7 @@ class _Round:
             self._after_death(slot, lost[0])
 
     def _after_death(self, slot: Slot, error: BaseException) -> None:
-        """Hand out again what a broken executor held, and blame whom to blame."""
+        """Reassign the units of a broken executor, and count a strike."""
         was_ready = slot.is_ready
         indices = slot.let_go()
         if not was_ready:

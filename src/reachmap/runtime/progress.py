@@ -1,4 +1,4 @@
-"""Progress on stderr: a bar on a terminal, else a plain line now and then."""
+"""Progress on stderr: a bar on a terminal, otherwise occasional lines."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ class Progress:
         self._total = max(total, self._done)
 
     def add(self, frames: int, ok: int) -> None:
-        """Count frames that were just done."""
+        """Count frames that were just finished."""
         self._done += frames
         self._ok += ok
         self._samples.append((self._clock(), self._done))
@@ -196,7 +196,7 @@ def clock_text(seconds: float) -> str:
 
 
 def _new_bar(stream: TextIO) -> rich.progress.Progress:
-    """Make a bar that is drawn when it is told to, without a thread of its own."""
+    """Make a bar that is drawn on request, without its own thread."""
     # Imported here: most runs have no terminal.
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn

@@ -1,4 +1,4 @@
-"""Computing units, and scans of them: interrupt them anywhere, start them again.
+"""Computing units, and scans of them, which can be interrupted and resumed anywhere.
 
 ::
 
@@ -99,7 +99,7 @@ def compute(
     stop : StopRequest, optional
         Is looked at now and then.
     measured : callable
-        Is told of each unit as it arrives.
+        Is called with each unit as it arrives.
 
     Raises
     ------
@@ -236,7 +236,7 @@ def command_line() -> str:
 
 @dataclass(kw_only=True)
 class _Run:
-    """A run at work; the :class:`~reachmap.runtime.job.Stages` of its work."""
+    """A run in progress; the :class:`~reachmap.runtime.job.Stages` of its work."""
 
     store: Store
     stop: StopRequest

@@ -1,4 +1,4 @@
-"""Ctrl-C, SIGTERM and a closed terminal, taken at a moment that suits the run."""
+"""Ctrl-C, SIGTERM and a closed terminal, handled at safe points of a run."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 class Interrupted(KeyboardInterrupt):
-    """The run was told to stop; the text says what is safe and how to go on."""
+    """The run was asked to stop; the text says what is safe and how to resume."""
 
 
 class StopRequest:

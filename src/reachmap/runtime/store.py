@@ -1,4 +1,4 @@
-"""Writing the finished units of a run: one writer, nothing lost, resumed by itself.
+"""Writing the finished units of a run: one writer, nothing lost, resumable.
 
 docs/decisions/journal-engine.md says why this is a file of lines and no database.
 """

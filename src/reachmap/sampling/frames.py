@@ -187,7 +187,7 @@ def approach_distance_m(cell: Cell) -> float:
 
 
 def below_rim_m(cell: Cell) -> float:
-    """How deep below the rim an approach may begin [m]; negative: all above it."""
+    """Deepest start of an approach below the rim [m]; negative: all start above it."""
     begins = min(cell.bin_scan.layers) + approach_distance_m(cell) * _steepness(cell)
     return float(cell.bin.inner[2] - begins.min())
 

@@ -100,7 +100,7 @@ def approach_directions(R: FloatArray, approach_axis: str) -> FloatArray:
 
 
 def _tilt_rotation(tilt_deg: float, azimuth_deg: float) -> FloatArray:
-    """Least rotation that takes straight down to the tilted direction, (3, 3).
+    """Smallest rotation from straight down to the tilted direction, (3, 3).
 
     The direction is (sin t cos φ, sin t sin φ, -cos t), so the axis is horizontal and
     square to the azimuth.

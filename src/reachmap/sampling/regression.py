@@ -1,4 +1,4 @@
-"""Kernel ridge regression over grasps: what holds at any, from what holds at some.
+"""Kernel ridge regression over grasps, from samples to any grasp.
 
 Two grasps are as far from each other as the tool has to move between them: its tip
 and a point further back, a *lever* away along the approach direction. Lengths and

@@ -1,4 +1,4 @@
-"""The volume that test grasps stand for: points in the bin, directions into it."""
+"""The volume that test grasps represent: points in the bin and directions."""
 
 from __future__ import annotations
 

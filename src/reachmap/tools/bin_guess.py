@@ -1,4 +1,4 @@
-"""A place for the bin of a new cell, and a tool long enough to pick from it."""
+"""Guess of a bin pose for a new cell, and of a tool long enough to pick from it."""
 
 from __future__ import annotations
 
@@ -189,7 +189,7 @@ def _oddness(pair: tuple[int, float]) -> float:
 def _clear(
     scene: Scene, places: Sequence[tuple[Place, float]]
 ) -> tuple[list[_Trial], str]:
-    """Places where the bin is clear of what stands still, and what bars the first."""
+    """Places where the bin is clear of static bodies, and what blocks the first."""
     fit = BinFit(scene.robot, scene.loaded, None)
     trials: list[_Trial] = []
     avoided = ""

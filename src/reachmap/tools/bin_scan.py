@@ -1,4 +1,4 @@
-"""``bin-scan``: a placed bin goes in, a bin map comes out."""
+"""``bin-scan``: from a placed bin to a bin map."""
 
 from __future__ import annotations
 
@@ -202,7 +202,7 @@ def estimate_bin_scan(
     seed: int | None = None,
     run: RunOptions = IN_PROCESS,
 ) -> dict[str, Any]:
-    """Say what a scan would do, timed on a few test grasps; nothing is written."""
+    """Estimate what a scan would do, timed on a few test grasps; write nothing."""
     loaded, _ = load_placed_cell(placement, cell, with_seed(overrides, seed), workspace)
     scene = Scene.shared(loaded, with_bin=True)
     scene.require_free_scan_configuration()

@@ -137,7 +137,7 @@ class MapComparisons:
     each : tuple of MapComparison
         The first map is the same in all.
     significant : tuple of bool
-        Which changes are more than chance, at a false-discovery rate of 5 % over all.
+        Which changes are significant, at a false-discovery rate of 5 % over all.
     """
 
     each: tuple[MapComparison, ...]

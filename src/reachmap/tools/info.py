@@ -45,7 +45,7 @@ class ArtefactInfo:
     kind : str
         As in ``"bin_map"``.
     finished : bool
-        False for the journal of a run that goes on or was interrupted.
+        False for the journal of a run that is in progress or was interrupted.
     record : record
         Of its kind.
     summary : summary
@@ -60,7 +60,7 @@ class ArtefactInfo:
 
     @property
     def cell_name(self) -> str:
-        """Name of the cell, "" if the artefact does not tell."""
+        """Name of the cell, "" if the artefact does not have it."""
         try:
             cell = json.loads(self.record.provenance.cell_resolved_json)
         except ValueError:

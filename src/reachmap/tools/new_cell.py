@@ -87,7 +87,7 @@ def new_cell(
     """Write a commented starter cell for a robot.
 
     Nothing is written where the cell could not be loaded: what is wrong then is not in
-    the cell. One that loads but cannot work yet is written, to be mended.
+    the cell. One that loads but needs fixing is written as well.
 
     Parameters
     ----------

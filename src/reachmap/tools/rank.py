@@ -46,7 +46,7 @@ class ListFormat:
     approach_axis : str or None
         Approach axis of imported orientations.
     invalid : {"raise", "mark"}
-        What becomes of grasps whose numbers are none.
+        How to treat grasps with invalid numbers.
     """
 
     name: str | None = None
@@ -69,7 +69,7 @@ class RankAnswer:
     ranked : tuple of RankedList
         One ranking for each list.
     explanation : str
-        The story of the grasp that was asked about, or "".
+        The explanation of the requested grasp, or "".
     written : tuple of Path
     """
 
@@ -203,7 +203,7 @@ def ranker_of(
 ) -> Ranker:
     """Make a ranker; what it cannot take from the map as asked is logged.
 
-    Unless told otherwise it has the calibration beside the map.
+    By default it has the calibration beside the map.
     """
     basis = basis or CostBasis()
     known = usual_calibration(map_path, bin_map.stamp) if calibrated else None
@@ -247,7 +247,7 @@ def _check_cell(
 
 
 def read_list(source: str | Path, list_format: ListFormat) -> GraspList:
-    """Read a grasp list; what is doubtful about it is logged."""
+    """Read a grasp list; suspicious things are logged."""
     # With a pose the frame needs no name that the cell knows.
     frame = list_format.frame
     if frame is None and list_format.frame_pose is not None:

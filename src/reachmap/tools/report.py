@@ -13,7 +13,7 @@ from reachmap.report.page import report_page
 
 
 def report(folder: str | Path, *, output: str | Path, overwrite: bool = False) -> Path:
-    """Write a run as one page that can be sent to somebody.
+    """Write the report of a run as one self-contained page.
 
     Parameters
     ----------

@@ -226,7 +226,7 @@ def _attempts(context: PickContext) -> str:
 
 
 def _context(bin_map: BinMap, map_name: str, pick: PickOptions) -> PickContext:
-    """How to plan, with no grasps yet: as the map was made, unless told otherwise."""
+    """Planning settings without grasps: by default those of the map."""
     overrides = pick.overrides
     if "attempts" not in bin_map.provenance.settings:
         # Older maps say nothing about attempts: they were all the planner's.

@@ -63,7 +63,7 @@ def view(
         Replace the page if it exists.
     options : ViewOptions, optional
     on_ready : callable
-        Is told the address when the live view can be opened.
+        Is called with the address when the live view can be opened.
     wait : callable, optional
         Returns when the live view is to end; by default it ends with Ctrl-C.
 

@@ -1,4 +1,4 @@
-"""Whole cycles as the map predicts them beside whole cycles planned anew."""
+"""Whole cycles as predicted by the map against re-planned ones."""
 
 from __future__ import annotations
 

@@ -230,7 +230,7 @@ def _placement_page(
 
 
 STEPS = 5
-# The page may run its own scripts and nothing else: no address is ever asked.
+# The page may run its own scripts and nothing else: no address is ever contacted.
 POLICY = (
     "default-src 'none'; script-src 'unsafe-inline' 'unsafe-eval' data: blob:; "
     "style-src 'unsafe-inline' data:; img-src data: blob:; font-src data:; "

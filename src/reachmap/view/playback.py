@@ -58,7 +58,7 @@ class Playback:
         return self.release > self.grasp
 
     def part_at(self, index: int) -> FloatArray | None:
-        """Configuration (dof,) whose tool tells where the part is; None without one.
+        """Configuration (dof,) whose tool determines the part's pose; None without one.
 
         It lies at the grasp, hangs on the tool, lies where it was let go.
         """

@@ -76,7 +76,7 @@ class Stage:
         ----------
         q : array, shape (dof,)
         part_at : array, shape (dof,), optional
-            Configuration whose tool tells where the part is; without one it is hidden.
+            Configuration whose tool determines the part's pose; None hides the part.
         """
         self._put_part(part_at)
         poses = self.cell.joint_poses(q)

@@ -1,1 +1,1 @@
-"""Places of the arm for a bin that stands: record, and format."""
+"""Placements of the robot base for a fixed bin: record and format."""

@@ -1,4 +1,4 @@
-"""Places of the arm: record to file and back."""
+"""Placements of the robot base: record to file and back."""
 
 from __future__ import annotations
 

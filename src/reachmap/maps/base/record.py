@@ -1,4 +1,4 @@
-"""Where the arm goes: base poses that were considered, and the one that was chosen."""
+"""Placement of the robot base: the poses considered, and the one chosen."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from reachmap.maps.records import Provenance, RunInfo, Stamp
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BasePlacement:
-    """Where the arm's base goes, the bin being fixed. Candidates are rows.
+    """Placement of the robot base for a fixed bin. Candidates are rows.
 
     Attributes
     ----------

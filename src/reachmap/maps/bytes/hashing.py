@@ -1,6 +1,6 @@
-"""Checksums: what an artefact says, what it was made from, and every byte of it.
+"""Checksums of an artefact: its content, its inputs, and everything in it.
 
-``content_sha256`` covers what the science rests on and is the same for the same
+``content_sha256`` covers the scientific result and is the same for the same
 inputs, seed and settings. ``integrity_sha256`` covers everything a file says, measured
 times and provenance included. Both are taken over the logical content, not over the
 bytes of the file, so that a repacked copy keeps them.
@@ -96,7 +96,7 @@ def content_sha256(tree: Tree) -> str:
 
 
 def integrity_sha256(tree: Tree) -> str:
-    """Hash of everything but itself: times, run, provenance, every attribute."""
+    """Hash of everything but itself: times, run, provenance, all attributes."""
     digest = hashlib.sha256()
     digest.update(str(tree.attributes.get("content_sha256", "")).encode())
     _add_attributes(digest, "", tree.attributes)

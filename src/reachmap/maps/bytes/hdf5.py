@@ -156,7 +156,7 @@ def tree_from_image(image: bytes) -> Tree:
 
 
 def identity_from_image(image: bytes) -> dict[str, str]:
-    """What an HDF5 image says it is: ``format`` and ``format_version``, if it does.
+    """``format`` and ``format_version`` of an HDF5 image, if it has them.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""A checksum over the bytes of an artefact, behind the end of the HDF5 data.
+"""A checksum over the bytes of an artefact, appended to the HDF5 data.
 
 The HDF5 library trusts what it reads: on a file with a few flipped bits it can loop
 for ever. So no artefact is handed to it before its bytes have been compared with this
@@ -49,7 +49,7 @@ def unseal(data: bytes) -> tuple[bytes, bool | None]:
 
 
 def named_size(image: bytes) -> int | None:
-    """Size of an HDF5 image as its superblock names it [bytes], None if it is odd.
+    """Size of an HDF5 image according to its superblock [bytes], None if odd.
 
     A shorter image was cut off, which is cheaper to see here than by reading it.
     """
@@ -77,7 +77,7 @@ SECONDS_PER_BYTE = 0.5e-6
 
 
 def reason_against(image: bytes) -> str:
-    """Say why an image must not be read here, "" if it may; another process tries."""
+    """Reason not to read an image in this process, found by another one; "" if none."""
     limit_s = TIME_LIMIT_S + SECONDS_PER_BYTE * len(image)
     try:
         done = subprocess.run(
@@ -95,7 +95,7 @@ def reason_against(image: bytes) -> str:
 
 
 def inspect(image: bytes) -> str:
-    """Read an image here and now; say what is wrong with it, "" if nothing is."""
+    """Read an image in this process and report what is wrong with it, or ""."""
     try:
         identity = identity_from_image(image)
         # Of a file of another program, nothing more will be read.
@@ -107,7 +107,7 @@ def inspect(image: bytes) -> str:
 
 
 def main() -> int:
-    """Inspect the image on standard input, write the reason against it, if any."""
+    """Inspect the image on standard input; write what is wrong with it, if anything."""
     reason = inspect(sys.stdin.buffer.read())
     sys.stdout.write(reason)
     return 1 if reason else 0

@@ -1,4 +1,4 @@
-"""Reading HDF5 images where that can do no harm.
+"""Reading HDF5 images in isolation from this process.
 
 The HDF5 library trusts what it reads: on an image with a few wrong bits it can loop for
 ever, or crash. A seal finds damage, but not a forgery with a fitting seal. So an image
@@ -87,7 +87,7 @@ def _in_copy(function: Callable[[bytes], Found], image: bytes) -> Found:
 def _answer(
     function: Callable[[bytes], Any], image: bytes, answer: int, limit_s: float
 ) -> NoReturn:
-    """Work as the copy: write the result, or why there is none, and end."""
+    """Run as the copy: write the result, or why there is none, and exit."""
     try:
         signal.signal(signal.SIGINT, signal.SIG_DFL)
         seconds = int(limit_s) + 1

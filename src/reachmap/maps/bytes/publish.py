@@ -1,4 +1,4 @@
-"""Putting a finished file in place: complete under its name, or not there at all."""
+"""Publishing a finished file atomically: complete under its name, or absent."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def check_output(
 
 
 def _obstacle(path: Path, target: Path, *, overwrite: bool) -> str:
-    """Say why nothing can be written there; "" if it can."""
+    """Reason why nothing can be written there; "" if it can."""
     folder = target.parent
     found = os.stat(path) if is_there(path) else None  # noqa: PTH116
     if found is not None and stat.S_ISDIR(found.st_mode):
@@ -115,7 +115,7 @@ def check_outputs(
     overwrite: bool,
     inputs: Sequence[str | Path | None] = (),
 ) -> None:
-    """Refuse places that cannot be written, that are inputs or that are one.
+    """Refuse outputs that cannot be written, that are inputs or that coincide.
 
     Parameters
     ----------
@@ -144,7 +144,7 @@ def check_outputs(
 
 
 def check_picture(path: Path | None, option: str) -> None:
-    """Refuse a picture of which the name does not say what it is."""
+    """Refuse a picture whose suffix is not .png or .svg."""
     if path is not None and path.suffix not in PICTURES:
         raise SettingsError(f"{option} {path}: expected a name in .png or .svg")
 
@@ -202,7 +202,7 @@ def publish(path: Path, chunks: Iterable[bytes], *, overwrite: bool = False) -> 
 
 @contextlib.contextmanager
 def announced(announce: Callable[[Identity | None], None]) -> Iterator[None]:
-    """Have the files that are published in a block announced before they are moved.
+    """Announce the files that are published in a block before they are moved.
 
     Parameters
     ----------
@@ -218,7 +218,7 @@ def announced(announce: Callable[[Identity | None], None]) -> Iterator[None]:
 
 
 def identity(path: Path) -> Identity | None:
-    """What tells a file from another in its place; None where there is none."""
+    """Identity of the file at a path; None where there is none."""
     if not is_there(path):
         return None
     found = path.stat()
@@ -300,7 +300,7 @@ def _link(temporary: Path, target: Path) -> None:
 
 
 def sync_folder(folder: Path) -> None:
-    """Make a rename last through a power cut, where the file system can."""
+    """Make a rename survive a power cut, where the file system supports it."""
     with contextlib.suppress(OSError):
         descriptor = os.open(folder, os.O_RDONLY)
         try:

@@ -1,4 +1,4 @@
-"""Values as JSON: plain, ready for people, and flattened to named leaves."""
+"""Values as JSON: plain, readable, and flattened to named leaves."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy as np
 
 
 def plain(value: Any) -> Any:
-    """Turn a value into what JSON knows: NumPy scalars, arrays, tuples become plain.
+    """Convert a value to JSON types: NumPy scalars, arrays and tuples become plain.
 
     Raises
     ------

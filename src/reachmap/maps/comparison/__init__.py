@@ -1,1 +1,1 @@
-"""Two maps of one kind held against each other, frame by frame."""
+"""Comparison of two maps of one kind, frame by frame."""

@@ -1,6 +1,6 @@
-"""Is a change more than chance: exact tests for shares of frames.
+"""Significance of a change: exact tests for shares of frames.
 
-SciPy's statistics are imported where they are used: readers of maps come by here, and
+SciPy's statistics are imported where they are used: readers of maps import this, and
 a ranking has no time for them.
 """
 

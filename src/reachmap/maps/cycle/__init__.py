@@ -1,1 +1,1 @@
-"""The pick cycle of a bin map: where its seconds go, and where it ends early."""
+"""The pick cycle of a bin map: its duration by stage, and where it ends early."""

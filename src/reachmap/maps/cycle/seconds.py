@@ -1,4 +1,4 @@
-"""Where the seconds of a pick go, and how many picks an hour they make."""
+"""Duration of a pick by stage, and picks per hour."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ NORMAL_95: Final = 1.96
 
 
 def cycle_parts(record: BinMap) -> tuple[tuple[str, ...], FloatArray]:
-    """Cut the cycle times of a map into the way to the grasp, the stages and waits.
+    """Split the cycle times of a map into the path to the grasp, stages and dwell.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ def failing_stage(cycle: Cycle) -> IntArray:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Throughput:
-    """How many picks an hour makes.
+    """Picks per hour, with an interval.
 
     Attributes
     ----------

@@ -110,7 +110,7 @@ class CycleSummary:
 
     @property
     def lower_lifts(self) -> str:
-        """How many lifts end lower than they might, "" where none does."""
+        """How many lifts end below the usual height, "" where none does."""
         if not self.lower:
             return ""
         return (
@@ -121,7 +121,7 @@ class CycleSummary:
 
     @property
     def sentence(self) -> str:
-        """What a pick takes, in words."""
+        """Duration of a pick in a sentence."""
         if self.throughput is None:
             return "no test grasp has a whole cycle"
         longest = max(self.parts, key=lambda part: part.seconds)

@@ -1,4 +1,4 @@
-"""Do the numbers of a bin map and of its optional parts agree with each other."""
+"""Consistency checks of the numbers of a bin map and its optional parts."""
 
 from __future__ import annotations
 

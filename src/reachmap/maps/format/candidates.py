@@ -1,4 +1,4 @@
-"""What placements of bins and of arms say alike of the places they considered."""
+"""What placements of bins and of robot bases share about their candidates."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Do the numbers of an artefact agree with each other: checks that formats share.
+"""Consistency checks of the numbers of an artefact that formats share.
 
 Each takes numbers whose structure is sound and returns sentences; an empty list means
 that all is well.

@@ -1,6 +1,6 @@
-"""Does a tree keep to the format of its kind: names, dimensions, types, ranges.
+"""Whether a tree follows the format of its kind: names, dimensions, types, ranges.
 
-What the numbers say to each other is checked in :mod:`reachmap.maps.format.checks`.
+Consistency between the numbers is checked in :mod:`reachmap.maps.format.checks`.
 Every check returns sentences; an empty list means that all is well.
 """
 

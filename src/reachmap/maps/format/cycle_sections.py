@@ -1,4 +1,4 @@
-"""What bin maps of version 1.1 hold of the pick cycle."""
+"""Variables of the pick cycle in bin maps of version 1.1."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How the format of an artefact is written down: variables, dimensions, attributes."""
+"""Declaration of artefact formats: variables, dimensions, attributes."""
 
 from __future__ import annotations
 
@@ -121,7 +121,7 @@ class Section:
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """What messages call a kind of artefact, and the command that makes it."""
+    """Name of a kind of artefact in messages, and the command that makes it."""
 
     name: str
     command: str
@@ -177,7 +177,7 @@ class Layout:
     def in_frame(
         self, field: str, T: FloatArray, names: Container[str], frame: str
     ) -> Layout:
-        """The layout of a file some of whose numbers are in a frame of their own.
+        """The layout of a file with some numbers in a frame other than robot_base.
 
         Parameters
         ----------
@@ -207,7 +207,7 @@ class Layout:
 
     @property
     def name(self) -> str:
-        """What a message calls it."""
+        """Its name in messages."""
         return KINDS[self.kind].name
 
     @property
@@ -327,7 +327,7 @@ def outcome(prefix: str, dims: tuple[str, ...]) -> tuple[Variable, ...]:
 
 
 def goal(prefix: str, dims: tuple[str, ...], which: str) -> Variable:
-    """Describe the joint positions that a result rests on."""
+    """Describe the joint positions that a result is based on."""
     return Variable(
         path=f"{prefix}goal_configuration",
         dims=(*dims, "joint"),

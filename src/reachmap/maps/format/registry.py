@@ -1,4 +1,4 @@
-"""Reading an artefact whose kind is not known beforehand."""
+"""Reading an artefact of unknown kind."""
 
 from __future__ import annotations
 

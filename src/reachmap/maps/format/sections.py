@@ -1,4 +1,4 @@
-"""What files of version 1.1 may have besides: evidence, effort, margins."""
+"""Optional sections of files of version 1.1: evidence, effort, margins."""
 
 from __future__ import annotations
 

@@ -161,14 +161,14 @@ def load(path: Path, *layouts: Layout) -> tuple[Tree, Layout]:
 
 
 def _read(image: bytes) -> tuple[dict[str, str], Tree]:
-    """Say what an image is, and read it if that is an artefact."""
+    """Identify an image, and read it if it is an artefact."""
     identity = identity_from_image(image)
     is_ours = kind_of_format(identity.get("format")) is not None
     return identity, tree_from_image(image) if is_ours else Tree()
 
 
 def _upgraded(tree: Tree) -> Tree:
-    """A tree of version 1.0 as version 1.1 has it; any other as it is.
+    """A tree of version 1.0 converted to version 1.1; any other unchanged.
 
     Joints were counted instead of named, and the dimensions of cubes were called like
     those of the root. Nothing else changed its form.
@@ -220,7 +220,7 @@ def check_hashes(tree: Tree) -> list[str]:
 
 
 def read_image(path: Path, layouts: Sequence[Layout] = ()) -> tuple[bytes, bool]:
-    """Read a file as an HDF5 image that is whole, as far as its bytes tell.
+    """Read a file as an HDF5 image whose bytes are intact.
 
     Returns
     -------
@@ -243,14 +243,14 @@ def read_image(path: Path, layouts: Sequence[Layout] = ()) -> tuple[bytes, bool]
 def _damaged(
     path: Path, image: bytes, reason: str, layouts: Sequence[Layout]
 ) -> MapFileError:
-    """Word what is wrong with the bytes of an image."""
+    """Describe what is wrong with the bytes of an image."""
     if is_open_for_writing(image):
         return MapFileError(f"{path}: {OPEN_ELSEWHERE}")
     return MapFileError(f"{path}: damaged, {reason}; {_expected(layouts)}")
 
 
 def read_bytes(path: Path, layouts: Sequence[Layout] = ()) -> bytes:
-    """Read a file, in words a user can act on when that fails."""
+    """Read a file; failures get messages that a user can act on."""
     try:
         data = read_up_to(path, MAX_BYTES)
     except FileNotFoundError as error:
@@ -318,7 +318,7 @@ def _expected(layouts: Sequence[Layout]) -> str:
 
 
 def _foreign(data: bytes) -> str:
-    """Name what a file is that is not HDF5."""
+    """Name the kind of a file that is not HDF5."""
     if not data:
         return "an empty file"
     if re.match(rb"\s*(\{|\[\s*[\[{\"\d-])", data):

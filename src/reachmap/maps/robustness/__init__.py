@@ -1,1 +1,1 @@
-"""Robustness of a bin map: record, format, and what it says in numbers."""
+"""Robustness of a bin map: record, format and summary."""

@@ -1,4 +1,4 @@
-"""Which test grasps stay reachable when bin, camera or tool are off."""
+"""Which test grasps stay reachable despite errors of bin, camera and tool."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ CERTIFICATES = tuple(item.name.lower() for item in Certificate)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Robustness:
-    """Best paths of a bin map in cells that are off.
+    """Best paths of a bin map in perturbed cells.
 
     Index order (scale, sample) of the perturbed cells, (layer, y, x, orientation) of
     the test grasps of the bin map.

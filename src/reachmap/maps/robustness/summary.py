@@ -1,4 +1,4 @@
-"""Robustness in a few numbers."""
+"""Summary of robustness."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ SOURCES = ("bin", "camera", "tool")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ErrorStep:
-    """What one multiple of the errors costs.
+    """Reachability at one multiple of the errors.
 
     Attributes
     ----------
@@ -38,7 +38,7 @@ class ErrorStep:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RobustnessSummary:
-    """Robustness in a few numbers.
+    """Summary of robustness.
 
     Attributes
     ----------
@@ -71,7 +71,7 @@ class RobustnessSummary:
 
     @property
     def given(self) -> ErrorStep:
-        """At the errors themselves."""
+        """The step at the given errors."""
         return next(step for step in self.steps if step.scale == 1.0)
 
 
@@ -86,7 +86,7 @@ def error_words(errors: Mapping[str, tuple[float, float]]) -> str:
 
 
 def summarise_robustness(record: Robustness) -> RobustnessSummary:
-    """Sum up what errors cost."""
+    """Summarise the effect of errors."""
     given = record.certificate[record.scale.tolist().index(1.0)]
     samples = record.reachability.shape[1]
     reached = record.reached == 1

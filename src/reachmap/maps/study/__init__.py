@@ -1,1 +1,1 @@
-"""Studies of variants: record, format, and what they say in numbers."""
+"""Studies of variants: record, format and summary."""

@@ -1,4 +1,4 @@
-"""The place of an arm in a few numbers."""
+"""Summary of a robot placement."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class BaseCandidate:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BaseSummary:
-    """A place of an arm in a few numbers.
+    """Summary of a robot placement.
 
     Attributes
     ----------
@@ -73,7 +73,7 @@ class BaseSummary:
 
 
 def summarise_base(placement: BasePlacement) -> BaseSummary:
-    """Summarise the place of an arm."""
+    """Summarise a robot placement."""
     chosen = _candidate(placement, placement.chosen)
     present = _row(placement, placement.present)
     gain = gain_error = None
@@ -134,7 +134,7 @@ def _candidate(placement: BasePlacement, row: int) -> BaseCandidate:
 
 
 def place_text(candidate: BaseCandidate, rail: str) -> str:
-    """Where it is, in words."""
+    """Its position as text."""
     if rail:
         return f"{rail} = {candidate.x:.3f} m"
     return (
@@ -144,14 +144,14 @@ def place_text(candidate: BaseCandidate, rail: str) -> str:
 
 
 def score_text(candidate: BaseCandidate) -> str:
-    """Its score, in words."""
+    """Its score as text."""
     if np.isnan(candidate.score):
         return candidate.reason
     return f"{candidate.score:.1f} ± {1.96 * candidate.score_error:.1f} %"
 
 
 def margin_text(margin: dict[str, float]) -> str:
-    """How far the base may be off, in words."""
+    """Margins of the base as text."""
     return ", ".join(
         f"{k} {v:.0f}°" if is_turn(k) else f"{k} {1000 * v:.0f} mm"
         for k, v in margin.items()
@@ -159,7 +159,7 @@ def margin_text(margin: dict[str, float]) -> str:
 
 
 def base_words(placement: BasePlacement) -> list[str]:
-    """What the search came to, line by line; the headline first."""
+    """Result of the search, line by line; the headline first."""
     summary = summarise_base(placement)
     lines = [
         f"{place_text(summary.chosen, summary.rail)} · {score_text(summary.chosen)}"

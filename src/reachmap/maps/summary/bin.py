@@ -1,4 +1,4 @@
-"""A bin map in a few numbers."""
+"""Summary of a bin map."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from reachmap.maps.summary.statistics import (
 
 @dataclass(frozen=True, slots=True)
 class Shown:
-    """How a measured variable is shown to people.
+    """Display name, unit and factor of a measured variable.
 
     Attributes
     ----------
@@ -106,7 +106,7 @@ class QuadrantSummary:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BinSummary:
-    """A bin map in a few numbers.
+    """Summary of a bin map.
 
     Attributes
     ----------

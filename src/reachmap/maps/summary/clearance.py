@@ -1,4 +1,4 @@
-"""How much room the best paths of a bin map leave before two bodies meet."""
+"""Clearance of the best paths of a bin map."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class ClearanceShare:
 
 
 def clearance_shares(record: BinMap) -> tuple[ClearanceShare, ...]:
-    """Share of test grasps by what their best path leaves; empty if it is not known."""
+    """Share of test grasps by clearance of their best path; empty if unknown."""
     tried = int(attempted(record).sum())
     if record.margins is None or not tried:
         return ()

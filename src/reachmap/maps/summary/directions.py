@@ -82,7 +82,7 @@ def direction_percent(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReachedShares:
-    """Three answers to what share of a bin is reached [percent], NaN of nothing.
+    """Reached shares of frames, directions and points [percent], NaN if there are none.
 
     Attributes
     ----------
@@ -112,7 +112,7 @@ def reached_shares(record: BinMap) -> ReachedShares:
 
 
 def mean_of_known(values: FloatArray) -> float:
-    """Mean of what is not NaN; NaN where nothing is known."""
+    """Mean without NaN; NaN if there is no value."""
     known = values[~np.isnan(values)]
     return float(known.mean()) if known.size else float("nan")
 

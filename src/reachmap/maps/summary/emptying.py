@@ -42,7 +42,7 @@ class EmptyingLevel:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Emptying:
-    """Reachability by height, and what stays behind.
+    """Reachability by height, and the share that remains.
 
     Attributes
     ----------
@@ -68,7 +68,7 @@ class Emptying:
 
     @property
     def sentence(self) -> str:
-        """What stays behind, in a sentence without its full stop."""
+        """What remains, as a sentence without full stop."""
         if not self.left:
             low = 1000.0 * self.levels[0].height_m
             return f"empties to {low:.0f} mm, the lowest level, everywhere"
@@ -116,7 +116,7 @@ def emptying_of(record: BinMap) -> Emptying | None:
 
 
 def volume_left(stuck: BoolArray, layer: FloatArray, depth: float) -> FloatArray:
-    """Share of a full column that stays at each point, (nl, ny, nx) to (ny, nx).
+    """Share of a full column that remains at each point, (nl, ny, nx) to (ny, nx).
 
     Parameters
     ----------
@@ -144,7 +144,7 @@ def _is_filled(record: BinMap) -> bool:
 
 
 def _place(record: BinMap, left: FloatArray) -> str:
-    """Where what stays lies, seen from the robot."""
+    """Where the remaining parts lie, seen from the robot."""
     total = float(left.sum())
     if total == 0:
         return ""

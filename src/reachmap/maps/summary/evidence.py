@@ -1,4 +1,4 @@
-"""What the verdict "no path found" rests on, in both maps."""
+"""Evidence behind the verdict "no path found", in both maps."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from reachmap.maps.records import Status
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EvidenceSummary:
-    """What a set of frames rests on.
+    """Evidence behind the verdicts of a set of frames.
 
     Attributes
     ----------
@@ -50,7 +50,7 @@ def evidence_of(
     status: Status,
     components: Components | None,
 ) -> EvidenceSummary:
-    """Sum up the evidence behind all frames of one status.
+    """Summarise the evidence behind all frames of one status.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""A bin placement in a few numbers."""
+"""Summary of a bin placement."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class CandidateSummary:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlacementSummary:
-    """A bin placement in a few numbers.
+    """Summary of a bin placement.
 
     Attributes
     ----------
@@ -70,7 +70,7 @@ class PlacementSummary:
 
 
 def summarise_placement(record: BinPlacement) -> PlacementSummary:
-    """Name the chosen pose, its margin and its rivals."""
+    """Summarise the chosen pose, its margin and its alternatives."""
     degrees = np.degrees(record.scan_configuration)
     tolerance = record.tolerance
     turn_deg = None if tolerance is None else float(np.degrees(tolerance[1]))

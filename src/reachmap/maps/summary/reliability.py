@@ -1,4 +1,4 @@
-"""Whether a term of J is a property of the grasp, or the luck of an attempt."""
+"""Whether a term of J is a property of the grasp, or chance in an attempt."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from reachmap._typing import FloatArray
 from reachmap.maps.records import BinMap
 
-# Below one half, most of what tells two grasps apart is luck.
+# Below one half, most of the difference between two grasps is chance.
 RELIABLE_SHARE = 0.5
 
 
@@ -22,7 +22,7 @@ class Reliability:
     grasps : int
         Grasps with at least one successful attempt.
     repeated : int
-        Those with at least two, without which nothing is known of luck.
+        Those with at least two, without which chance cannot be estimated.
     between, within : float
         Variance of the grasps' true means, and of attempts at one grasp, in the
         measure's unit squared; NaN without repeated grasps.
@@ -39,7 +39,7 @@ class Reliability:
 
     @property
     def is_noise(self) -> bool:
-        """Whether most of the variance is luck."""
+        """Whether most of the variance is chance."""
         return self.share < RELIABLE_SHARE
 
 
@@ -84,7 +84,7 @@ def reliability_of(values: FloatArray) -> Reliability:
 
 
 def term_reliability(record: BinMap) -> dict[str, Reliability]:
-    """Reliability of what J is made of, and of the measured planning time.
+    """Reliability of the terms of J, and of the measured planning time.
 
     Keys are ``path_length``, ``effort_checks`` (where the map counts them),
     ``planning_cpu_time`` (where attempts are independent) and ``execution_time``.
@@ -94,7 +94,7 @@ def term_reliability(record: BinMap) -> dict[str, Reliability]:
     if record.effort is not None:
         checks = record.effort.checks.astype(float)
         measures["effort_checks"] = np.where(found, checks, np.nan)
-    # Attempts that share their search share its time; that tells nothing of luck.
+    # Attempts that share their search share its time, which hides chance.
     if record.provenance.settings.get("attempts", "planner") != "roadmap":
         measures["planning_cpu_time"] = record.planning_cpu_time
     measures["execution_time"] = record.execution_time

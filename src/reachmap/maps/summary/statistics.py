@@ -1,4 +1,4 @@
-"""What the maps say in numbers: shares with intervals, causes, levels, saturation."""
+"""Statistics of the maps: shares with intervals, causes, levels, saturation."""
 
 from __future__ import annotations
 
@@ -180,7 +180,7 @@ def frames_of(record: WorkspaceMap | BinMap) -> tuple[CodeArray, IntArray]:
 
 
 def ik_approximation(settings: Mapping[str, Any]) -> str:
-    """How inverse kinematics is approximate, in words; "" where it is complete.
+    """Description of approximate inverse kinematics; "" where it is complete.
 
     Parameters
     ----------

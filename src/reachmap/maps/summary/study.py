@@ -1,4 +1,4 @@
-"""What a study says: main effects, the change of each variant, the best one."""
+"""Summary of a study: main effects, the change of each variant, the best one."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class VariantSummary:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MainEffect:
-    """Mean of an objective over all else, value by value of one parameter.
+    """Mean of an objective over the other parameters, per value of one parameter.
 
     Attributes
     ----------
@@ -160,7 +160,7 @@ def changes_text(study: Study, row: int) -> str:
 
 
 def sentence(study: Study, row: int, objective: int) -> str:
-    """What a designer asks: what the change is worth, and whether it is noise."""
+    """The change of a variant and its significance, as a sentence."""
     name = study.objective_names[objective]
     word = CHANGE_WORDS[OBJECTIVES[name]]
     digits = 1 if word == "points" else 3

@@ -1,4 +1,4 @@
-"""A workspace map in a few numbers."""
+"""Summary of a workspace map."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class LevelSummary:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WorkspaceSummary:
-    """A workspace map in a few numbers.
+    """Summary of a workspace map.
 
     Attributes
     ----------

@@ -1,1 +1,1 @@
-"""Where the arm goes for a bin that stands: mountings, places of the base, the best."""
+"""Placement of the robot base for a fixed bin: mountings, candidates, the best."""

@@ -1,4 +1,4 @@
-"""From the searches for each arm and mounting to the place of the arm."""
+"""From the searches for each arm and mounting to the robot placement."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Can the base of an arm, with what carries it, stand somewhere."""
+"""Whether a robot base and its mounting fit at a pose."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 class BaseFit:
-    """Checks poses of a base against the bin and all that stays in the world.
+    """Checks poses of a base against the bin and the bodies that stay in the world.
 
     Pairs that may touch, or that do as the cell is, are left out.
 
@@ -76,7 +76,7 @@ class BaseFit:
         return f"{first} collides with {second}"
 
     def _pairs(self, loaded: LoadedCell, *, first: bool) -> set[tuple[str, str]]:
-        """Pairs that touch and may not; the first of each moving body if that does."""
+        """Forbidden contacts, at most one for each moving body."""
         T_world_base = loaded.cell.robot.base_pose.matrix()
         moving = [(b.name, b.shape, T_world_base @ b.T) for b in self._base]
         shapes = world_shapes(loaded)

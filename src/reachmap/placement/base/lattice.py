@@ -1,4 +1,4 @@
-"""Places that are looked at first: a lattice around the bin, as far as the arm reaches.
+"""Initial candidates: a lattice around the bin, as far as the arm reaches.
 
 The base faces the bin at each as it does where the cell has it.
 """
@@ -24,7 +24,7 @@ HEIGHTS_M = 0.30
 
 
 def reach_m(kinematics: Kinematics) -> float:
-    """How far the TCP gets from robot_base, whichever way [m]."""
+    """Upper bound of the TCP's distance from robot_base [m]."""
     robot = kinematics.robot
     rng = np.random.default_rng(0)
     half_turn = np.where(robot.is_revolute, np.pi, np.inf)
@@ -108,7 +108,7 @@ def axis_values(low: float, high: float, own: float, step: float) -> list[float]
 
 
 def facing(region: Region, own: Pose, x: float, y: float) -> float:
-    """Turn that has the bin in the same direction as now, inside the region [rad]."""
+    """Heading that keeps the bin in its present direction, within the region [rad]."""
     low, high = float(region.low[3]), float(region.high[3])
     near = min(np.hypot(x, y), np.hypot(own[0], own[1])) < LEAST_STEP_M
     turn = 0.0 if near else float(np.arctan2(-y, -x) - np.arctan2(-own[1], -own[0]))
@@ -117,7 +117,7 @@ def facing(region: Region, own: Pose, x: float, y: float) -> float:
 
 
 def smoothed(poses: Sequence[Pose], values: Sequence[float]) -> FloatArray:
-    """Half of each value, half of the mean of its neighbours on the lattice.
+    """Average of each value and the mean of its neighbours on the lattice.
 
     Of places that promise as much, those with good places around them come first; a
     place that is missing counts 0.

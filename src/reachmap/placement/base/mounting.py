@@ -1,4 +1,4 @@
-"""How an arm is mounted, and what a pose of its base stands for."""
+"""Mountings of an arm, and the meaning of a base pose in each."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ class Mounting:
         return Scene.build(loaded, with_bin=True, world_moves=True)
 
     def at(self, scene: Scene, loaded: LoadedCell) -> Scene:
-        """Self-collision and kinematics stay; the world is put elsewhere."""
+        """Self-collision and kinematics stay; the world is moved."""
         return scene.with_world_of(loaded)
 
 
@@ -107,7 +107,7 @@ class RailMounting:
         return Scene.build(loaded, with_bin=True)
 
     def at(self, scene: Scene, loaded: LoadedCell) -> Scene:
-        """A new scene, for the arm is another."""
+        """A new scene, since the arm differs."""
         return Scene.build(loaded, with_bin=True)
 
 

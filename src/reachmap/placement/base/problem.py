@@ -1,4 +1,4 @@
-"""What is asked about the place of an arm, and what can be said of single poses."""
+"""The problem of placing a robot base, and checks of single poses."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ SPARSE: Grid = (3, 3, 3)
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class BaseProblem:
-    """What is asked: an arm, how it is mounted, and where its base may stand.
+    """An arm, its mounting, and where its base may stand.
 
     Attributes
     ----------
@@ -92,7 +92,7 @@ class BaseProblem:
         return "no drop-off can be reached"
 
     def can_be_imaged(self, pose: Pose) -> bool:
-        """Whether some scan configuration images the bin; asked where it is chosen."""
+        """Whether some scan configuration images the bin, where it may be chosen."""
         if self.keep_scan:
             return True
         return next(imaging_configurations(self.scene_at(pose)), None) is not None
@@ -114,7 +114,7 @@ class BaseProblem:
         return self.mounting.at(self.scene, self.mounting.cell_at(self.loaded, pose))
 
     def placed(self, pose: Pose) -> PlacedScene:
-        """The scene with the base at a pose, and what its test frames offer."""
+        """The scene with the base at a pose, and the goals of its test frames."""
         sample = sample_of(self.loaded.cell, THIN, self.is_open)
         return PlacedScene(self.scene, pose, sample, self.mounting)
 

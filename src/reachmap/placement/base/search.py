@@ -1,4 +1,4 @@
-"""Where the base goes: predicted places, mapped exactly, then improved and settled."""
+"""Search for a base pose: predicted places, mapped exactly, then refined."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ ASKED_PER_PLACE = 4
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class BaseOutcome:
-    """What a search for one arm and mounting came to.
+    """Result of the search for one arm and mounting.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""How places of an arm are searched for, as stored in artefacts."""
+"""Settings of the search for a robot placement, as stored in artefacts."""
 
 from __future__ import annotations
 

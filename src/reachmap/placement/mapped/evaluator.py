@@ -1,4 +1,4 @@
-"""Exact scores on all cores, with one set of workers for the whole search."""
+"""Exact scores in parallel, with one worker pool for the whole search."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ class Evaluator:
     Attributes
     ----------
     cpu_s : float
-        What the workers have spent so far.
+        CPU time and checks of the workers so far.
     mapped : int
         Poses looked at so far with the bin in the scene.
     """
@@ -96,7 +96,7 @@ class Evaluator:
         self.mapped = 0
 
     def expect(self, poses: int) -> None:
-        """Say how many more poses will be looked at, at most."""
+        """Announce the maximum number of further poses."""
         if self._expects:
             self._progress.expect(self.mapped + poses)
         else:
@@ -156,7 +156,7 @@ class Evaluator:
         self.mapped += 1
 
     def _is_open(self, request: Request, above: float) -> bool:
-        """Whether a pose must be looked at, or looked at again."""
+        """Whether a pose still has to be evaluated."""
         known = self._known.get(request)
         if known is None:
             return True
@@ -194,7 +194,7 @@ def open_evaluator(
 
 
 class Prepared:
-    """A worker's scene, with the bin where it was last wanted.
+    """A worker's scene, with the bin at its last pose.
 
     Parameters
     ----------
@@ -211,13 +211,13 @@ class Prepared:
 
     @cached_property
     def _key(self) -> str:
-        """What a score depends on besides the request and what stands around.
+        """Hash of what a score depends on besides the request and the surroundings.
 
         "" where the pose is not that of the bin: then what stands around moves.
         """
         if self._placing is not BIN_PLACING:
             return ""
-        # Where the bin stands is what is asked.
+        # The bin's pose is part of the request.
         known = fingerprint(
             self._loaded,
             without=("bin.pose", "bin.frame", "bin.on"),
@@ -229,10 +229,10 @@ class Prepared:
     def memoized(
         self, unit: tuple[Request, float], compute: Callable[[], dict[str, Any]]
     ) -> dict[str, Any]:
-        """Score a pose, or take it over from a cell in which the score is the same."""
+        """Score a pose, or reuse the score of a cell in which it is the same."""
         if Memo.current is None or not self._key:
             return compute()
-        # What is computed for a unit is asked in it.
+        # Queries for a unit belong to its computation.
         self._placed = self._at = None
         pose = unit[0].pose
         scene = self._placing.at(

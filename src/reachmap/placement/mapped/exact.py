@@ -38,7 +38,7 @@ Pose = tuple[float, float, float, float]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PoseScore:
-    """How well the arm is served at one pose of the bin.
+    """Score of one pose of the bin.
 
     Attributes
     ----------
@@ -76,16 +76,16 @@ def bin_at(cell: Cell, pose: Pose) -> FloatArray:
 
 
 class Placing(Protocol):
-    """What a pose is a pose of, and how a scene gets there."""
+    """What is placed at a pose, and how to build its scene."""
 
     def cell_at(self, loaded: LoadedCell, pose: Pose) -> LoadedCell:
-        """The cell as it is with the pose; CellError where it cannot be."""
+        """The cell at the pose; CellError where that is impossible."""
 
     def scene(self, loaded: LoadedCell) -> Scene:
-        """A scene that :meth:`at` can be asked of."""
+        """A scene from which :meth:`at` derives others."""
 
     def at(self, scene: Scene, loaded: LoadedCell) -> Scene:
-        """A scene of a cell of :meth:`cell_at`; ``scene`` is of no use any more."""
+        """Scene of a cell of :meth:`cell_at`; invalidates ``scene``."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,7 +109,7 @@ BIN_PLACING = BinPlacing()
 
 
 class PlacedScene:
-    """A cell with its bin, or its arm, at one pose, and what its test frames offer.
+    """A cell with its bin, or its arm, at one pose, and the goals of its test frames.
 
     Parameters
     ----------
@@ -174,7 +174,7 @@ class PlacedScene:
 
     @property
     def bound(self) -> float:
-        """What frames with a free configuration count for; no score is higher [%]."""
+        """Upper bound of the score: weight of frames with a free configuration [%]."""
         return 100.0 * float(self._sample.weight @ (np.diff(self._begin) > 0))
 
     @property
@@ -283,7 +283,7 @@ class PlacedScene:
         )
 
     def _percent(self, reached: BoolArray) -> float:
-        """What frames count for, those beyond the array being none of them [%]."""
+        """Weighted share of frames; those beyond the array do not count [%]."""
         return 100.0 * float(self._sample.weight[: len(reached)] @ reached)
 
     def _score(self, connection: Connection) -> PoseScore:
@@ -308,7 +308,7 @@ class PlacedScene:
 
 
 def effort(spec: RoadmapSpec) -> RoadmapSpec:
-    """How hard a score tries, of what a map would."""
+    """Planning effort of a score as a share of that of a map."""
     few = max(1, spec.max_checks // SHARE_OF_CHECKS)
     return spec.model_copy(update={"max_checks": few, "samples": 0})
 

@@ -93,7 +93,7 @@ def imaging_configurations(
 
 
 def picture_of(scene: Scene, q: FloatArray) -> str:
-    """What is wrong with the picture of the bin that a scene's camera takes, or "".
+    """Defect of the image that a scene's camera takes of the bin, or "".
 
     Parameters
     ----------

@@ -1,8 +1,8 @@
-"""Few test frames of a bin that stand for all of the cell's.
+"""A sample of the test frames of a bin that represents all of them.
 
 Two things make a few hundred frames as good as all. What the tool itself loses to the
 bin's walls is the same wherever the bin stands, so it is counted once, over all frames
-(:func:`open_frames`); the sample only has to tell how the arm does with the rest. And
+(:func:`open_frames`); the sample only has to estimate the reachability of the rest. And
 neighbouring points fare alike, so each point of the sample has a part of the
 orientations only, and its neighbours have the others. What remains are points close to
 each other in place of orientations of the same point, which fail together.
@@ -112,7 +112,7 @@ def frames_in_bin(cell: Cell) -> FrameGrid:
 
 
 def rolls_of(cell: Cell) -> FloatArray:
-    """Rolls about the approach axis that will do, as T_tcp_rolled, shape (n, 4, 4).
+    """Equivalent rolls about the approach axis, as T_tcp_rolled, shape (n, 4, 4).
 
     The identity where rolls are as listed; of many that are free, a few.
     """
@@ -125,7 +125,7 @@ def rolls_of(cell: Cell) -> FloatArray:
 
 
 def kept_layers(count: int) -> list[int]:
-    """Layers that placement looks at: of many the lowest, middle and highest."""
+    """Layers used by placement: of many the lowest, middle and highest."""
     return list(range(count)) if count <= MAX_LAYERS else [0, count // 2, count - 1]
 
 
@@ -194,7 +194,7 @@ def sample_of(cell: Cell, grid: Grid, is_open: BoolArray) -> Sample:
 
 
 def spread_indices(count: int, wanted: int) -> tuple[IntArray, FloatArray]:
-    """Few of the indices 0 … ``count`` − 1, with the share each stands for.
+    """A few of the indices 0 … ``count`` − 1, with the share each represents.
 
     Reachability falls off at the walls: the first and the last stand for themselves,
     the others for equal parts of the rest, in the middle of which they lie.

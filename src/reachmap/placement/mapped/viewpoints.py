@@ -74,7 +74,7 @@ def camera_poses(view: View, range_m: tuple[float, float]) -> FloatArray:
 def visibility_grades(
     T_bin_camera: FloatArray, view: View, camera: CameraSpec
 ) -> IntArray:
-    """How little of a bin is missing from each picture, shape (n,).
+    """Visibility grade of a bin in each picture, lower is better, shape (n,).
 
     Parameters
     ----------

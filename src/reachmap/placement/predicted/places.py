@@ -78,8 +78,8 @@ def spread_out(
 ) -> list[Candidate]:
     """Best candidates that stand at least a distance apart, best first.
 
-    This is non-maximum suppression: whatever stands near a better one is passed over.
-    So is what turns out not to be usable, which is asked of few.
+    This is non-maximum suppression: candidates near a better one are skipped.
+    So are unusable ones, which are checked only when needed.
     """
     chosen: list[Candidate] = []
     scored = [c for c in candidates if c.score is not None]

@@ -1,6 +1,6 @@
 """Scores of very many bin poses from the map alone, by interpolation.
 
-The bin is not in the map. Two things stand in for it: the frames at which its walls
+The bin is not in the map. Two things replace it: the frames at which its walls
 would touch the tool, wherever the bin stands, count as lost; and every frame is looked
 up under the orientation of the map nearest to its own. What the walls do to the rest
 of the arm shows only when the best poses are mapped again with the bin in the scene.
@@ -47,7 +47,7 @@ class Footprint:
 
 
 def footprint_of(cell: Cell, is_open: BoolArray) -> Footprint:
-    """Few points of a cell's bin, all orientations.
+    """A few points of a cell's bin, with all orientations.
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ class Prediction:
 def orientation_shares(
     field: ReachField, footprint: Footprint, yaw_rad: float
 ) -> tuple[FloatArray, FloatArray]:
-    """How much each orientation of the map stands for at each point of the bin.
+    """Weight of each orientation of the map at each point of the bin.
 
     Returns
     -------

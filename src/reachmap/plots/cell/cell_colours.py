@@ -1,4 +1,4 @@
-"""What colour the parts of a cell have, in pictures and in the 3-D view."""
+"""Colours of the parts of a cell, in pictures and in the 3-D view."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Heaps after the last pick, from above: what stays, and why."""
+"""Heaps after the last pick, from above: the parts that remain, and why."""
 
 from __future__ import annotations
 

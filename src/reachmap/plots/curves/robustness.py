@@ -1,4 +1,4 @@
-"""What errors cost: certified and kept reachability over their size."""
+"""Robustness curve: certified and remaining reachability over the size of errors."""
 
 from __future__ import annotations
 

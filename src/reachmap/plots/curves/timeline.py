@@ -1,4 +1,4 @@
-"""The timeline of a pick: what follows what, and where the seconds go."""
+"""The timeline of a pick: its stages and their durations."""
 
 from __future__ import annotations
 

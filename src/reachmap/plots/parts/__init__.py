@@ -1,1 +1,1 @@
-"""What pictures share: style, squares, outlines, legends, files."""
+"""Shared parts of pictures: style, squares, outlines, legends, files."""

@@ -56,7 +56,7 @@ class BinView:
 
 
 def view_of(bin_map: BinMap) -> BinView:
-    """Bring together a bin map and what its cell says of the bin."""
+    """Combine a bin map with the bin of its cell."""
     context = context_of(bin_map.provenance)
     outer = bin_map.bin_inner[:2] + 2.0 * NOMINAL_WALL
     if context.cell is not None:

@@ -1,4 +1,4 @@
-"""Writing pictures and tables: complete files, and none over an existing one."""
+"""Writing pictures and tables atomically, without overwriting."""
 
 from __future__ import annotations
 

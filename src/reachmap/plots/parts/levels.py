@@ -1,4 +1,4 @@
-"""What a workspace map says per level: quantities, means, best level, square, patch."""
+"""Figures of a workspace map per level: quantities, means, best level and square."""
 
 from __future__ import annotations
 

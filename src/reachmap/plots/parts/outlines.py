@@ -1,4 +1,4 @@
-"""What stands in the cell, as outlines seen from above, to scale.
+"""Outlines of the bodies in a cell, seen from above, to scale.
 
 They are in the level frame of the cell, which is robot_base where that is upright.
 """

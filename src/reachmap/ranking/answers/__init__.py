@@ -1,1 +1,1 @@
-"""What a ranking gives back: ordered lists, explanations, files."""
+"""Results of a ranking: ordered lists, explanations, files."""

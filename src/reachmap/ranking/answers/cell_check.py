@@ -1,4 +1,4 @@
-"""Whether a map was made for the cell that a user names."""
+"""Whether a map was made for a given cell."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ NOT_THE_CELL: Final = (
 
 
 def differing_sections(bin_map: BinMap, loaded: LoadedCell) -> list[str]:
-    """Name the parts in which the map's cell is another than the one loaded.
+    """Name the sections in which the map's cell differs from the one loaded.
 
     The pose of the bin and the scan configuration are left out, because placing the
     bin changes them; so are the settings of scans and planner. Files are compared by

@@ -1,4 +1,4 @@
-"""One grasp's story: its test grasp, the attempts at it, its cost, its rank."""
+"""Explanation of one grasp: its test grasp, the attempts at it, its cost, its rank."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def find_grasp(ranked: Sequence[RankedList], name: str) -> tuple[RankedList, int
 
 
 def explanation(ranked: RankedList, row: int, ranker: Ranker, bin_map: BinMap) -> str:
-    """Tell why a grasp has the rank it has.
+    """Explain the rank of a grasp.
 
     Parameters
     ----------
@@ -139,7 +139,7 @@ def _attempts_line(
 
 
 def _cause(at: tuple[int, ...], bin_map: BinMap) -> str:
-    """Say what stands in the way of a test grasp, with the pair of bodies if known."""
+    """Cause that blocks a test grasp, with the pair of bodies if known."""
     code = int(bin_map.status[at])
     pair = int(bin_map.blocking_pair[at])
     said = {

@@ -1,4 +1,4 @@
-"""Where ranked lists go: one file, one folder, and never over the supplied list."""
+"""Writing ranked lists: to one file or a folder, never over the supplied list."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Questions that a list raises of which the map knows less than it should.
+"""Plausibility warnings for a list that the map covers less than expected.
 
 A list in other units, with normals for approach directions or in another frame looks
 well-formed, and every row of it is wrong. Where part of a list is unlike the map, the
@@ -39,14 +39,14 @@ NOWHERE_M: Final = 1e-6
 
 
 def matched_count(ranking: Ranking) -> int:
-    """Grasps that the map speaks about."""
+    """Number of grasps within the map."""
     return int((~np.isin(ranking.status, [*UNMATCHED])).sum())
 
 
 def plausibility_warnings(
     grasps: GraspList, ranking: Ranking, rank: Callable[[GraspList], Ranking]
 ) -> tuple[str, ...]:
-    """Ask about the mistake that explains why a list does not fit the map.
+    """Warnings about mistakes that would explain why a list does not fit the map.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ def plausibility_warnings(
 
 
 def _usual_mistakes(grasps: GraspList, far_m: float) -> Iterator[tuple[str, GraspList]]:
-    """Questions, each with the list as it would be without the mistake."""
+    """Possible mistakes, each with the list as it would be without it."""
     normals = "are these outward normals? then direction_convention: outward_normal"
     millimetres = 'are these millimetres? then units: {"length": "mm"}'
     both = "are these outward normals in millimetres? then state units and convention"

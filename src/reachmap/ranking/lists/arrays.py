@@ -113,7 +113,7 @@ def arrays_from_document(
 
 
 def _without_pose(grasp: Mapping[str, Any]) -> dict[str, Any]:
-    """A grasp that is none: NaN for its position and direction."""
+    """An invalid grasp: NaN for its position and direction."""
     nowhere = 3 * [np.nan]
     rest = {key: value for key, value in grasp.items() if key not in POSE_KEYS}
     return {**rest, "position": nowhere, "direction": nowhere}

@@ -1,7 +1,7 @@
 """The ``reachmap.grasps`` 1.x document: every rule of its schema, and of geometry.
 
 The JSON Schema shipped beside this module describes the same format for editors and
-producers; these checks say in addition what is physically absurd.
+producers; these checks also find what is physically impossible.
 """
 
 from __future__ import annotations

@@ -37,11 +37,11 @@ class Findings:
     warnings: list[tuple[JsonPath, str]] = field(default_factory=list)
 
     def mistake(self, path: JsonPath, message: str) -> None:
-        """Note something that makes the document unusable."""
+        """Record something that makes the document unusable."""
         self.mistakes.append((path, message))
 
     def warn(self, path: JsonPath, message: str) -> None:
-        """Note something usable that deserves a look."""
+        """Record something usable but suspicious."""
         self.warnings.append((path, message))
 
 

@@ -107,7 +107,7 @@ def grasps_from_document(
 
 
 def _is_of_a_pose(path: JsonPath) -> bool:
-    """Whether a mistake is in the numbers of a grasp, which then is none."""
+    """Whether a mistake is in the numbers of a grasp, which makes it invalid."""
     return path[:1] == ("grasps",) and len(path) > 2 and path[2] in POSE_KEYS
 
 

@@ -32,7 +32,7 @@ MIN_DISTANCE_M: Final = 1e-6
 
 
 def outside_map(points: FloatArray, nearest: IntArray, table: GraspTable) -> BoolArray:
-    """Which grasps the map says nothing about, shape (n,).
+    """Which grasps lie outside the map, shape (n,).
 
     A grasp is outside when it is sideways of its nearest test point by more than half
     a grid diagonal and a millimetre, or below the lowest or above the highest layer by
@@ -80,7 +80,7 @@ def beyond_points(points: FloatArray, table: GraspTable) -> BoolArray:
 
 
 def likeness_terms(matches: Matches, free: BoolArray, table: GraspTable) -> FloatArray:
-    """φ6: how unlike its test grasp a grasp is, shape (n,).
+    """φ6: distance between a grasp and its test grasp, shape (n,).
 
     φ6 = ½ (φ1 / h + φ2 / ω), where h is the larger pitch of the grid and ω the
     greatest angle between neighbouring orientations of the map (of approach axes where

@@ -1,4 +1,4 @@
-"""From the frame of a grasp list to robot_base, by what the bin map knows."""
+"""From the frame of a grasp list to robot_base, with the frames of the bin map."""
 
 from __future__ import annotations
 

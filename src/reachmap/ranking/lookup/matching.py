@@ -231,16 +231,16 @@ def match_past(
     tree: NearestPoints,
     cost: FloatArray,
 ) -> Matches:
-    """Match some grasps anew, past test grasps that say nothing about them.
+    """Match some grasps again, skipping test grasps that do not apply to them.
 
     Parameters
     ----------
     matches : Matches
         From :func:`match`.
     rows : int array, shape (m,)
-        Grasps that are matched anew; one that has nothing else near stays as it is.
+        Grasps to match again; one without another near test grasp stays as it is.
     left_out : bool array, shape (points, orientations)
-        Test grasps that are passed over.
+        Test grasps to skip.
     queries, table, tree, cost
         As in :func:`match`.
     """

@@ -1,4 +1,4 @@
-"""The order of a list of grasps, with the reason of each."""
+"""The order of a list of grasps, with a reason for each."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whether a part has room in the bin where it is gripped, in closed form.
+"""Whether a gripped part fits in the bin, in closed form.
 
 A map says so at its test grasps, and a few millimetres beside one it may be the other
 way round: a part that is gripped lower would be inside the bottom, one nearer to the
@@ -27,7 +27,7 @@ from reachmap.maps.records import BinMap
 from reachmap.ranking.lookup.approach import rotation_between
 from reachmap.ranking.lookup.matching import Queries
 
-# Turns of the tool that are asked where any will do.
+# Rolls of the tool that are tried where any is allowed.
 _TURNS = 24
 # Grasps looked at together: some hundred megabytes for a part of many corners.
 _AT_ONCE = 500
@@ -62,7 +62,7 @@ class PartRoom:
 
     @classmethod
     def of(cls, bin_map: BinMap, T_bin_base: FloatArray) -> PartRoom | None:
-        """Room in the bin of a map; None where it does not say what the part is."""
+        """Room in the bin of a map; None where the map does not define the part."""
         corners = bin_map.part_corners
         if corners is None:
             return None

@@ -1,4 +1,4 @@
-"""Grasps from arrays: checked row by row, and told whether their roll counts."""
+"""Grasps from arrays: checked row by row, with whether their roll is fixed."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def queries_from_arrays(
     roll: Roll = "as-given",
     invalid: Invalid = "mark",
 ) -> Queries:
-    """Check grasps in robot_base and say for each whether its roll counts.
+    """Check grasps in robot_base; determine for each whether its roll is fixed.
 
     Parameters
     ----------

@@ -124,7 +124,7 @@ class Ranker:
     def from_map(cls, path: str | Path, basis: CostBasis | None = None) -> Ranker:
         """Load a bin map, and the calibration beside it if there is one.
 
-        A calibration of another map is passed over with a warning.
+        A calibration of another map is ignored with a warning.
 
         Raises
         ------
@@ -363,7 +363,7 @@ class Ranker:
         return (*columns.names, FAILURE), np.column_stack([seconds, failing])
 
     def failure_cost_s(self, settings: RankSettings) -> float:
-        """What a failed pick costs, the median cycle unless told [s]."""
+        """Cost of a failed pick, by default the median cycle [s]."""
         if settings.failure_cost_s is not None:
             return settings.failure_cost_s
         return cycle_of(self.table).usual_failure_s()

@@ -1,4 +1,4 @@
-"""What a ranking can be asked for: weights, likeness, margins, neighbours, roll."""
+"""Settings of a ranking: weights, likeness, margins, neighbours, roll."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ MARGINS: Final = ("clearance", "joint_margin", "singularity", "wind_up")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CostBasis:
-    """What the terms of J are made of; it belongs to the table, not to one question.
+    """Definition of the terms of J; it belongs to the table, not to one request.
 
     Attributes
     ----------
@@ -65,7 +65,7 @@ class CostBasis:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RankSettings:
-    """What grasps are ordered by, and how test grasps are matched.
+    """Order of grasps, and matching of test grasps.
 
     Attributes
     ----------
@@ -90,7 +90,7 @@ class RankSettings:
         Largest φ2 at which a grasp counts as like its test grasp; beyond, the map
         says nothing about it. None: 1.5 times the spacing of the map's orientations.
     invalid : {"mark", "raise"}
-        What becomes of rows that are not finite, have no direction or no rotation.
+        How to treat rows that are not finite or lack a direction or a rotation.
     """
 
     cost: Cost = "paper"
@@ -131,7 +131,7 @@ class RankSettings:
             raise SettingsError(mistakes)
 
     def _cost_problems(self) -> list[str]:
-        """What does not go with the cost that is asked for."""
+        """Settings that contradict the requested cost."""
         failure_s = self.failure_cost_s
         if self.cost not in COSTS:
             return [f"cost must be one of {', '.join(COSTS)} (got {self.cost!r})"]

@@ -1,4 +1,4 @@
-"""How much is reached around a grasp: a kernel estimate over nearby test grasps.
+"""Share reached around a grasp: a kernel estimate over nearby test grasps.
 
 The share reached among the orientations near the grasp's own, weighted by a von
 Mises-Fisher kernel, is interpolated linearly between the test points around it. Beyond
@@ -25,7 +25,7 @@ MAP_WEIGHT: Final = 0.02
 
 
 class Surroundings:
-    """The test grasps of a map as a field that can be asked anywhere.
+    """The test grasps of a map as a field that can be evaluated anywhere.
 
     Parameters
     ----------

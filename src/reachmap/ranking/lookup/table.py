@@ -1,4 +1,4 @@
-"""The bin map as the table that ranking looks things up in."""
+"""The bin map as the look-up table of ranking."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ SAME_AXIS_RAD: Final = 1e-6
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GraspTable:
-    """Test grasps by point and orientation, with the means that J is made of.
+    """Test grasps by point and orientation, with the means that J is computed from.
 
     Points are numbered in the order (layer, y, x); n points, m orientations.
 
@@ -268,7 +268,7 @@ def _margins(
 
 
 def _scale(means: FloatArray, maxima: FloatArray, basis: CostBasis) -> FloatArray:
-    """What values (reachable, k) are divided by, shape (k,)."""
+    """Divisors that normalise values (reachable, k), shape (k,)."""
     scale: FloatArray = maxima
     if basis.normalise == "quantile" and len(means):
         quantile = np.quantile(means, QUANTILE, axis=0)

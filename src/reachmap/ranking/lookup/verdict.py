@@ -1,6 +1,6 @@
-"""Verdicts between the test grasps, from the grasps that refine a map.
+"""Verdicts between the test grasps, from the grasps of a map's refinement.
 
-A test grasp stands for a box of places and a cone of directions, through which the
+A test grasp represents a box of positions and a cone of directions, through which the
 boundary of what is reachable may run. A refined map has further grasps along that
 boundary; a regression over them decides, and a test grasp near by gives the cost.
 """
@@ -74,7 +74,7 @@ class RefinedVerdicts:
     def decide(
         self, queries: Queries, matches: Matches, share: FloatArray
     ) -> tuple[Matches, CodeArray]:
-        """Choose test grasps that stand for grasps, by the verdicts between them.
+        """Choose the test grasps that represent grasps, by the verdicts between them.
 
         Parameters
         ----------
@@ -141,7 +141,7 @@ class RefinedVerdicts:
     def _nearest(
         self, queries: Queries, points: FloatArray, axes: FloatArray
     ) -> IntArray:
-        """Number of the grasp that the tool has to move least to, shape (n,)."""
+        """Index of the grasp with the least tool motion, shape (n,)."""
         lever_m = self._refinement.lever_m
         asked = tool_points(queries.points, queries.axes, lever_m)
         nodes = tool_points(points, axes, lever_m)

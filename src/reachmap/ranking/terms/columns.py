@@ -1,4 +1,4 @@
-"""The terms of a cost, one column each, as a question asks for them."""
+"""The requested terms of a cost, one column each."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class Columns:
 
 
 def columns_of(table: GraspTable, settings: RankSettings) -> Columns:
-    """Arrange the terms that a question asks for.
+    """Arrange the requested terms.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Optional terms of J: margins of the best path, and how far it winds the wrist up.
+"""Optional terms of J: margins of the best path, and the winding of the wrist.
 
 A margin m becomes a cost that falls from 1 where nothing is left to 0 where as much is
 left as anywhere: max(0, 1 - m/s), where s is the 95 % quantile of m over the

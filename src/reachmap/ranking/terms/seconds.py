@@ -21,7 +21,7 @@ PLANNING, FAILURE = "planning_s", "failure_s"
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class CycleSeconds:
-    """What picks over test grasps take.
+    """Duration of picks at test grasps, by stage.
 
     Attributes
     ----------
@@ -47,7 +47,7 @@ class CycleSeconds:
         return np.isfinite(self.values[..., 0])
 
     def usual_failure_s(self) -> float:
-        """What a failure costs unless told: a whole cycle, the median of the map."""
+        """Default cost of a failure: the median whole cycle of the map [s]."""
         if not self.whole.any():
             return 0.0
         return float(np.median(self.values[self.whole].sum(axis=-1)))

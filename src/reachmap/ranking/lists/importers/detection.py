@@ -1,4 +1,4 @@
-"""Which format a grasp list is in, by what it holds and never by its name."""
+"""Detection of the format of a grasp list from its content, not its name."""
 
 from __future__ import annotations
 
