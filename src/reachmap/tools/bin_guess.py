@@ -41,7 +41,7 @@ THIN = 3
 # As a share of the reach: the size of a bin, and of the gaps between random poses.
 NEAR = 0.35
 # A tool points down up to 60 degrees. Places that are near such poses in less than this
-# share of the cases of the best one are passed over: an arm that hangs from a shoulder
+# share of the cases of the best one are skipped: an arm that hangs from a shoulder
 # is hardly ever so in front of it (0.04), one on a pedestal often (0.5 and more).
 DOWN, FEW = 0.5, 0.4
 POINTS = np.array([[0.0, 0.0], [-0.3, -0.3], [0.3, -0.3], [-0.3, 0.3], [0.3, 0.3]])
@@ -98,7 +98,7 @@ def guess_bin(
         Built with ``bin_moves``, its TCP at the tip; not to be used any more.
     T_base_tcp : array, shape (n, 4, 4)
         Poses of random configurations. Places that few of them come near with the
-        tool pointing down are passed over.
+        tool pointing down are skipped.
     with_tool : bool
         Whether the TCP may be put beyond the tip, as if on a tool.
     """

@@ -200,7 +200,7 @@ def _first_choices(
 
 
 class _Attempt:
-    """Choices that get better as the arm is moved about.
+    """Guesses that are refined while the arm is moved about.
 
     Parameters
     ----------
@@ -219,7 +219,7 @@ class _Attempt:
         self.notes: list[str] = []
 
     def refine(self) -> tuple[str, ...]:
-        """Move the arm; say why the cell cannot work yet, if it cannot.
+        """Move the arm to refine the guesses; report problems that remain.
 
         Raises
         ------
@@ -242,7 +242,7 @@ class _Attempt:
             return error.lines
 
     def _loaded(self) -> LoadedCell:
-        """The cell as it would be read from the disk."""
+        """The cell as it would be read from disk."""
         try:
             loaded = cell_from_text(
                 starter_text(self.choices), label=LABEL, directory=self._folder
@@ -283,7 +283,7 @@ class _Attempt:
         return Scene.build(self._loaded())
 
     def _with_bin(self, scene: Scene, Q: FloatArray) -> Scene:
-        """Put the bin where it is clear of what stands still, and picked from."""
+        """Place the bin clear of static bodies, where the arm can pick from it."""
         tip, T_base_tcp = self.choices.tip, scene.kinematics.forward_many(Q)
         best: BinGuess | None = None
         choices = self.choices
@@ -354,7 +354,7 @@ class _Attempt:
             self.choices = chosen
 
     def _states(self) -> dict[str, dict[str, float]]:
-        """Named states that say where every joint is."""
+        """Named states that define every joint."""
         moveit = self._source.moveit
         return {
             name: values

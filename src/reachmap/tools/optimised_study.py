@@ -1,4 +1,4 @@
-"""Work of a study whose variants are proposed one round after the other."""
+"""Work of a study whose variants are proposed in rounds."""
 
 from __future__ import annotations
 

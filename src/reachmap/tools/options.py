@@ -25,7 +25,7 @@ def written_by(output: Path, run: RunOptions) -> Path:
 
 
 def warn_of_nothing(record: WorkspaceMap | BinMap | None, output: Path) -> None:
-    """Say on stderr why a map has nothing reachable, if it has nothing."""
+    """Warn on stderr if a map has nothing reachable, with the cause."""
     why = "" if record is None else why_unreachable(record)
     if why:
         logger.warning("%s: %s", output, why)

@@ -1,4 +1,4 @@
-"""``place-bin``: a workspace map goes in, the pose of the bin comes out."""
+"""``place-bin``: from a workspace map to the pose of the bin."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ RULES = ("search", "paper")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlacementChoice:
-    """How the bin is placed.
+    """Options on how the bin is placed.
 
     Attributes
     ----------
@@ -267,7 +267,7 @@ def _problem(
 def _tolerance(
     loaded: LoadedCell, choice: PlacementChoice, supports: Sequence[TopFace]
 ) -> Tolerance:
-    """What the user asks for, else what the cell does."""
+    """Tolerance from the user, or else from the cell."""
     given = loaded.cell.placement.tolerance
     shift_m, turn_deg = choice.tolerance or (given.shift_m, given.turn_deg)
     turn_rad = float(np.radians(turn_deg))
@@ -275,7 +275,7 @@ def _tolerance(
 
 
 def _still_camera(scene: Scene) -> FloatArray | None:
-    """Where a camera is that the tool does not carry, in robot_base, or None."""
+    """Pose of a camera that is not on the tool, in robot_base, or None."""
     if scene.loaded.cell.camera is None:
         return None
     camera = Camera(scene.robot, scene.loaded)
@@ -328,7 +328,7 @@ def _decide(problem: PlacementProblem, choice: PlacementChoice) -> Decision:
 def _settings(
     placed: LoadedCell, outcome: Outcome, choice: PlacementChoice, limit: ToolLimit
 ) -> dict[str, Any]:
-    """What the placement depends on, and the limit of the tool."""
+    """Settings of the placement, and the limit of the tool."""
     return placement_settings() | {
         "top": choice.top,
         "limits": {k: list(v) for k, v in choice.limits.items()},

@@ -1,4 +1,4 @@
-"""``place-bin`` for a cell with several bins: a place for each beside the others."""
+"""``place-bin`` for a cell with several bins, placed so that they do not overlap."""
 
 from __future__ import annotations
 
@@ -205,7 +205,7 @@ def _placed(
 
 
 def _worst(found: Mapping[str, PlacedBin]) -> float:
-    """Worst case of the bin that is served worst [percent]."""
+    """Worst case of the bin with the lowest score [percent]."""
     scores = []
     for placed in found.values():
         placement = placed.placement

@@ -1,4 +1,4 @@
-"""``place-robot``: a cell goes in, the place of its arm comes out."""
+"""``place-robot``: from a cell to the pose of its robot base."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ from reachmap.tools.prologue import path_of_cell, refuse_cell_files
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RobotChoice:
-    """How the arm is placed.
+    """Options on how the robot is placed.
 
     Attributes
     ----------
@@ -96,7 +96,7 @@ def place_robot(
     picture: str | Path | None = None,
     run: RunOptions = IN_PROCESS,
 ) -> BasePlacement:
-    """Choose where the arm stands for a bin that is fixed in the world.
+    """Choose the robot's base pose for a bin that is fixed in the world.
 
     Parameters
     ----------
@@ -174,7 +174,7 @@ def _check(choice: RobotChoice) -> None:
 def _cells(
     cell: str, overrides: Sequence[str], choice: RobotChoice
 ) -> list[LoadedCell]:
-    """The cell, and the same with each other arm."""
+    """The cell, and its versions with each other arm."""
     own = read_cell(cell, overrides)
     others = [
         read_cell(

@@ -1,4 +1,4 @@
-"""The picture of a placement that was just decided."""
+"""The picture of a new placement."""
 
 from __future__ import annotations
 

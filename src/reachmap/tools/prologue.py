@@ -1,4 +1,4 @@
-"""What a tool does first: see that its results have a place, before any work."""
+"""Checks of outputs that a tool makes before any work."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from reachmap.runtime.store import store_path
 def check_scan_output(
     output: Path, run: RunOptions, inputs: Sequence[str | Path | None]
 ) -> None:
-    """Refuse a place for a scan, as far as that needs no scene.
+    """Refuse an output of a scan, as far as that needs no scene.
 
     An output with a journal beside it may be what an earlier part of this run has
     published; whether it is, the run itself finds out.
@@ -44,7 +44,7 @@ def path_of_cell(name_or_path: str | None) -> Path | None:
 
 
 def refuse_cell_files(outputs: Iterable[Path | None], *cells: LoadedCell) -> None:
-    """Refuse outputs that would replace what cells are made from.
+    """Refuse outputs that would replace files of the cells.
 
     Raises
     ------

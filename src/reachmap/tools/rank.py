@@ -33,7 +33,7 @@ logger = logging.getLogger(__name__)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ListFormat:
-    """How grasp lists are to be read, where they do not say so themselves.
+    """Format of grasp lists, where they do not state it themselves.
 
     Attributes
     ----------
@@ -58,7 +58,7 @@ class ListFormat:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RankAnswer:
-    """What a ranking gives back.
+    """Result of ranking lists.
 
     Attributes
     ----------
@@ -201,7 +201,7 @@ def ranker_of(
     *,
     calibrated: bool = True,
 ) -> Ranker:
-    """Make a ranker; what it cannot take from the map as asked is logged.
+    """Make a ranker; deviations from the requested basis are logged.
 
     By default it has the calibration beside the map.
     """
@@ -228,7 +228,7 @@ def _check_cell(
     *,
     force: bool,
 ) -> None:
-    """Refuse a map of another cell, and to replace what the cell is made from."""
+    """Refuse a map of another cell, and outputs that replace files of the cell."""
     # Imported here: reading cells takes longer than ranking.
     from reachmap.cell.loading import read_cell
     from reachmap.ranking.answers.cell_check import differing_sections

@@ -47,7 +47,7 @@ def report(folder: str | Path, *, output: str | Path, overwrite: bool = False) -
 
 
 def _cell(run: RunFolder) -> LoadedCell | str:
-    """Cell of the run, or why it cannot be loaded: the numbers are worth a page."""
+    """Cell of the run, or why it cannot be loaded; the report is made anyway."""
     role, record = list(run.artefacts.items())[-1]
     try:
         return cell_of_artefact(record.provenance, run.files[role])

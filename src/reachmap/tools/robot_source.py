@@ -1,4 +1,4 @@
-"""The robot that ``new-cell`` is given: URDF, packages, arguments, MoveIt's files."""
+"""Sources of ``new-cell``: URDF, packages, arguments, MoveIt configuration."""
 
 from __future__ import annotations
 
@@ -180,7 +180,7 @@ def _packages_of(found: RobotSource, expansions: list[Expansion]) -> list[str]:
 
 
 def _to_be_named(resolver: Resolver, name: str) -> Path | None:
-    """Folder of a package that the cell alone would not lead to, in another shell."""
+    """Folder of a package found by the environment only, to be named in the cell."""
     if name in resolver.packages:
         return Path(resolver.packages[name])
     return resolver.found_by_environment(name)

@@ -1,4 +1,4 @@
-"""``robust``: a bin map and errors go in, what stays reachable comes out."""
+"""``robust``: from a bin map and errors to what stays reachable."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def robust(
     picture: str | Path | None = None,
     run: RunOptions = IN_PROCESS,
 ) -> Robustness:
-    """Say which test grasps stay reachable when bin, camera or tool are off.
+    """Find which test grasps stay reachable despite errors of bin, camera and tool.
 
     Parameters
     ----------

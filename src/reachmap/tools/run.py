@@ -1,4 +1,4 @@
-"""``reachmap run``: a cell in, the whole chain of maps out, into one folder."""
+"""``reachmap run``: the whole pipeline for a cell, into one folder."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ MAPS = ("workspace.h5", "placement.h5", "bin.h5")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PipelineAnswer:
-    """What a run of the whole chain left.
+    """Files of a run of the pipeline.
 
     Attributes
     ----------
@@ -146,7 +146,7 @@ def _told(folder: Path, grasps: Sequence[str | Path]) -> Path:
 
 
 class _Chain:
-    """Makes artefacts one from the other, or keeps them."""
+    """Makes artefacts from each other, or keeps existing ones."""
 
     def __init__(self, run: RunOptions) -> None:
         self._run = run

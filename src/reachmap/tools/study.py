@@ -1,4 +1,4 @@
-"""``study``: a cell and what to vary go in, a study of all variants comes out."""
+"""``study``: from a cell and what to vary to a study of all variants."""
 
 from __future__ import annotations
 
@@ -157,7 +157,7 @@ def _factors(
     *,
     halving: bool,
 ) -> tuple[Factor, ...]:
-    """Read what is varied; ways to choose variants that exclude each other are told."""
+    """Read what is varied; refuse contradictory ways to choose variants."""
     if samples is not None and optimise is not None:
         raise SettingsError("give --optimise or --latin-hypercube, not both")
     if halving and optimise is not None:
@@ -185,7 +185,7 @@ class _Design:
     def work(
         self, document: dict[str, Any], samples: int | None, *, halving: bool
     ) -> Work:
-        """Work of variants that are known beforehand."""
+        """Work of a fixed list of variants."""
         variants = (
             grid(self.factors)
             if samples is None

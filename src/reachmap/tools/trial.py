@@ -1,4 +1,4 @@
-"""Moving an arm about to see what suits it: approach axis, touching links, view."""
+"""Sampling an arm's configurations: approach axis, touching links, view."""
 
 from __future__ import annotations
 
@@ -107,7 +107,7 @@ def touching_links(scene: Scene, Q: FloatArray) -> dict[tuple[str, str], float]:
 
 
 def touching_notes(touching: Mapping[tuple[str, str], float]) -> list[str]:
-    """Name pairs that touch oftener than links do, though not always."""
+    """Name pairs that touch suspiciously often, though not always."""
     return [
         f"{first} and {second} touch in {share:.0%} of random configurations; if the "
         "real arm's do not, disable the pair in robot.srdf"

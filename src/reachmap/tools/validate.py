@@ -1,4 +1,4 @@
-"""``reachmap validate``: a bin map and grasps in, how well it predicted out."""
+"""``reachmap validate``: how well a bin map predicts planning to grasps."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ class PickOptions:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ValidateAnswer:
-    """What a validation gives back.
+    """Result of a validation.
 
     Attributes
     ----------
@@ -135,7 +135,7 @@ def validate(
     """
     output, chart = as_path(output), as_path(chart)
     asked, pick = settings or RankSettings(), pick or PickOptions()
-    # Ways in are judged by J, and cycles by seconds, whatever is asked for.
+    # Paths are judged by J, and cycles by seconds, whatever the settings.
     settings = settings_in_j(asked)
     _check_request(sources, random, pick, top)
     check_picture(chart, "--chart")
@@ -187,7 +187,7 @@ def _judged(
     results: PickResults,
     cycles: CycleResults | None,
 ) -> list[JudgedList]:
-    """Hold every list against what was planned to its grasps."""
+    """Compare every list with the plans to its grasps."""
     judged = []
     for label, one, rows in zip(_labels(ranked), ranked, _rows_of(ranked), strict=True):
         own = judge_list(label, one, ranker, bin_map, results.take(rows))
@@ -361,7 +361,7 @@ def _write(
         text = json.dumps(facts_of(validation, body_pairs), indent=1, allow_nan=False)
         publish(output, [text.encode("ascii"), b"\n"], overwrite=overwrite)
     if chart is not None:
-        # Imported here: drawing is asked for seldom.
+        # Imported here: drawing is rarely requested.
         from reachmap.plots.parts.files import write_picture
         from reachmap.plots.validation import validation_chart
 

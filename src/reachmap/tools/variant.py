@@ -1,4 +1,4 @@
-"""One variant of a study: a cell goes in, what it reaches comes out."""
+"""One variant of a study: from its cell to its objectives."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ def map_workspace(context: Any, loaded: LoadedCell) -> dict[str, Any]:
 
 
 def compute_variant(context: VariantContext, unit: VariantUnit) -> dict[str, Any]:
-    """Map a variant; what is wrong with it is a result, too."""
+    """Map a variant; a failure is a result as well."""
     try:
         with _MEMO.active():
             return _computed(context, unit)

@@ -1,4 +1,4 @@
-"""``verify``: files go in, for each a verdict whether it is whole comes out."""
+"""``verify``: whether files are intact and follow their format."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Verdict:
     ----------
     path : Path
     kind : str
-        As in ``"bin map"``; "" where that could not be told.
+        As in ``"bin map"``; "" where it could not be determined.
     facts : mapping
         What was counted and recomputed, as JSON values.
     problems : tuple of str
@@ -76,7 +76,7 @@ class Verification:
 
 
 def verify(paths: Sequence[str | Path]) -> Verification:
-    """Check files for damage, and against the contract of their kind.
+    """Check files for damage, and against the format of their kind.
 
     Every byte is read, so that the checksums of HDF5 are compared; the hashes over
     content and file are recomputed; names, dimensions, types, units and ranges are

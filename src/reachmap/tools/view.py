@@ -30,7 +30,7 @@ class ViewOptions:
     """How the live view is served.
 
     On an address other than those of this machine alone, a token is part of the
-    address that is printed, and nobody gets in without it.
+    printed address, and access without it is denied.
     """
 
     host: str = HOST
@@ -118,7 +118,7 @@ def view(
 
 
 def _address(host: str, port: int, token: str) -> str:
-    """Address of the view; where it listens everywhere, as this machine sees it."""
+    """URL of the view; for a wildcard host, as seen from this machine."""
     name = {"0.0.0.0": HOST, "::": "::1"}.get(host, host)
     name = f"[{name}]" if ":" in name else name
     return f"http://{name}:{port}" + (f"/?token={token}" if token else "")

@@ -1,4 +1,4 @@
-"""``workspace-scan``: a cell goes in, a workspace map comes out."""
+"""``workspace-scan``: from a cell to a workspace map."""
 
 from __future__ import annotations
 
@@ -160,7 +160,7 @@ def estimate_workspace_scan(
     seed: int | None = None,
     run: RunOptions = IN_PROCESS,
 ) -> dict[str, Any]:
-    """Say what a scan would do, timed on a few frames; nothing is written."""
+    """Estimate what a scan would do, timed on a few frames; write nothing."""
     _check_method(method, run)
     loaded = read_cell(cell, with_seed(overrides, seed))
     scene = Scene.build(loaded, with_bin=with_bin)

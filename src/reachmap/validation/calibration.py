@@ -1,4 +1,4 @@
-"""Calibration of a map's predictions, and how far probabilities are from what happens.
+"""Calibration of a map's predictions, and the calibration error of probabilities.
 
 The curve is an isotonic regression (pool adjacent violators: R. E. Barlow et al.,
 "Statistical inference under order restrictions", 1972) of reached or not over the share
@@ -39,7 +39,7 @@ class ReliabilityBin:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReliabilityDiagram:
-    """Probabilities beside frequencies.
+    """Predicted probabilities against observed frequencies.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""Planning whole cycles to grasps for real, with the part."""
+"""Planning whole cycles to grasps, with the part."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _STAGE = 2
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class CycleResults:
-    """What planning whole cycles found. One row per grasp, r attempts each.
+    """Results of planning whole cycles. One row per grasp, r attempts each.
 
     Attributes
     ----------

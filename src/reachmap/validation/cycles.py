@@ -99,14 +99,14 @@ class CycleSummary:
 
 
 def settings_in_seconds(settings: RankSettings) -> RankSettings:
-    """The same question by predicted seconds."""
+    """The same settings with the cost in predicted seconds."""
     return replace(
         settings, cost="cycle", weights=EVEN, likeness=0.0, margins={}, neighbours=1
     )
 
 
 def settings_in_j(settings: RankSettings) -> RankSettings:
-    """The same question by J."""
+    """The same settings with the cost J."""
     return replace(settings, cost="paper", failure_cost_s=None)
 
 
@@ -116,7 +116,7 @@ def judge_cycles(
     settings: RankSettings,
     results: CycleResults,
 ) -> JudgedCycles:
-    """Put planned cycles beside predicted ones.
+    """Compare planned cycles with predicted ones.
 
     Parameters
     ----------

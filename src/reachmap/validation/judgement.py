@@ -1,4 +1,4 @@
-"""A ranked list beside what planning found: predictions, measurements, orders."""
+"""A ranked list compared with planning: predictions, measurements, orders."""
 
 from __future__ import annotations
 
@@ -108,7 +108,7 @@ def judge_list(
     bin_map: BinMap,
     results: PickResults,
 ) -> JudgedList:
-    """Put what planning found beside what the map predicted."""
+    """Compare planning results with the map's predictions."""
     ranking = ranked.ranking
     weights = np.asarray(ranked.asked.weights, float)
     scale = weights / ranker.table.scale
@@ -146,7 +146,7 @@ def judge_list(
 
 
 def _costs(bin_map: BinMap, ranker: Ranker, results: PickResults) -> FloatArray:
-    """What J is made of, attempt by attempt, shape (n, r, 3); NaN without a path."""
+    """Terms of J attempt by attempt, shape (n, r, 3); NaN without a path."""
     costs = results.measured[..., IN_COST].copy()
     if ranker.table.basis.planning_time == "checks" and bin_map.effort is not None:
         # In the unit of the map: a nominal cost per check, not this machine's.

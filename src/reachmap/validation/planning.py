@@ -1,4 +1,4 @@
-"""Planning to grasps for real: all branches, every roll, the bin in the scene."""
+"""Planning to grasps: all branches, every roll, the bin in the scene."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from reachmap.cell.loading import LoadedCell
 
 FURTHEST = (Status.APPROACH_BLOCKED, Status.IK_IN_COLLISION, Status.NO_IK)
-"""States without a goal; the one nearest to success tells why a grasp failed."""
+"""States without a goal; the one nearest to success is the cause of a failure."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -59,7 +59,7 @@ class PickContext:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PickResults:
-    """What planning found. One row per grasp, r attempts each.
+    """Planning results. One row per grasp, r attempts each.
 
     Attributes
     ----------

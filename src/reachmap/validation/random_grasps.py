@@ -1,4 +1,4 @@
-"""Grasps anywhere in the volume that a bin map stands for, as a list."""
+"""Random grasps in the volume covered by a bin map, as a list."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def random_grasps(bin_map: BinMap, count: int, seed: int) -> GraspList:
 
 
 def mapped_volume(table: GraspTable) -> GraspVolume:
-    """The volume that the test grasps of a map stand for."""
+    """The volume covered by the test grasps of a map."""
     return GraspVolume.of(
         table.bin_points,
         table.layers,

@@ -36,7 +36,7 @@ from reachmap.validation.planning import (
 
 ROADMAPS = 2
 """Roadmaps with seeds of their own, between which attempts take turns: what differs
-between them is luck, which attempts over one roadmap would hide."""
+between them is chance, which attempts over one roadmap would hide."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -1,4 +1,4 @@
-"""Numbers that compare predictions with what was found."""
+"""Statistics that compare predictions with outcomes."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def share_of(hits: int, total: int) -> Share:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Confusion:
-    """Predictions against findings. Grasps outside the map are counted apart.
+    """Predictions against outcomes. Grasps outside the map are counted separately.
 
     Attributes
     ----------

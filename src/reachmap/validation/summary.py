@@ -1,4 +1,4 @@
-"""A validation in a few numbers."""
+"""Summary of a validation."""
 
 from __future__ import annotations
 
@@ -118,7 +118,7 @@ class Validation:
     groups : tuple of GroupSummary
     reliability : mapping of str to Reliability
         Of a single attempt's path length, state checks, CPU and execution time: what
-        share of the variance is the grasp and not luck.
+        share of the variance is the grasp and not chance.
     diagram : ReliabilityDiagram
         Predicted probabilities beside the outcomes of the grasps.
     cycles : tuple of CycleSummary

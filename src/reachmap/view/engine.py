@@ -1,4 +1,4 @@
-"""The optional viewer: found here, or missed with a word on how to get it."""
+"""The optional viewer, imported here, or an error that says how to install it."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def require_viewer() -> None:
 def start_server(
     port: int, *, host: str = HOST, guard: Guard | None = None
 ) -> viser.ViserServer:
-    """Start a viewer that only the page it serves can talk to.
+    """Start a viewer that only accepts requests from its own page.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ def start_server(
 
 
 def stop_server(server: viser.ViserServer) -> None:
-    """End a viewer without a word."""
+    """Stop a viewer silently."""
     with contextlib.redirect_stdout(io.StringIO()):
         server.stop()
 

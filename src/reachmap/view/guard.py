@@ -1,4 +1,4 @@
-"""Who may look at the live view: the page it served itself, and holders of its token.
+"""Access control of the live view: its own page, and holders of its token.
 
 A server on this machine can be reached by every web page that is open in a browser
 here. Browsers say which page asks (``Origin``) and which name it asked for (``Host``);
@@ -26,7 +26,7 @@ COOKIE = "reachmap-view"
 
 
 class Guard:
-    """Judges requests to the live view.
+    """Accepts or refuses requests to the live view.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ class Guard:
         self.is_posted = False
 
     def reason_against(self, request: Request) -> str:
-        """Say why a request must not be answered, "" if it may."""
+        """Reason to refuse a request, "" if it may be answered."""
         hosts = request.headers.get_all("Host")
         if len(hosts) != 1:
             return "expected one Host"
@@ -77,7 +77,7 @@ class Guard:
         return hmac.compare_digest(given.encode(errors="replace"), self.token.encode())
 
     def finish(self, response: Response) -> None:
-        """Let the browser keep the token, and no other page show this one inside."""
+        """Store the token in a cookie, and forbid embedding in other pages."""
         response.headers["X-Frame-Options"] = "DENY"
         if self.token:
             response.headers["Set-Cookie"] = (
@@ -86,7 +86,7 @@ class Guard:
 
 
 def is_loopback(host: str) -> bool:
-    """Whether a name or address is one that only this machine has."""
+    """Whether a name or address is a loopback one."""
     if host == "localhost":
         return True
     try:

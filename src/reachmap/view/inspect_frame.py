@@ -1,4 +1,4 @@
-"""What a click asks: which configuration shows this test frame, and what blocks it."""
+"""Inspection of a clicked test frame: its configuration, and what blocks it."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class Answer:
 
     @property
     def words(self) -> str:
-        """The state, and what is in the way."""
+        """The state, and the bodies in the way."""
         said = STATUS_NAMES[self.status]
         if not self.blocking:
             return said

@@ -62,7 +62,7 @@ PAUSE_S, LEVEL_S = 0.7, 1.6
 
 
 def page_of(record: Artefact | None, cell: SolidCell, paths: Sequence[int] = ()) -> str:
-    """Write an artefact as a page that needs nothing but a browser.
+    """Write an artefact as a page that needs only a browser.
 
     A bin map plays stored paths from the scan configuration to their grasps, in the
     time they take; a workspace map shows its levels one after another, with the arm at
@@ -262,7 +262,7 @@ SCALE = """<div id="reachmap-scale"></div>
 
 
 def framed(page: str, *, title: str, subtitle: str, scale: str) -> str:
-    """Put a caption on a viewer's page, and forbid it every address.
+    """Add a caption to a viewer's page, and a policy that forbids every address.
 
     Parameters
     ----------

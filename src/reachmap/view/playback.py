@@ -26,7 +26,7 @@ HELD_STAGES = 3
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Playback:
-    """What the arm does from the scan configuration to a grasp, and after it.
+    """Motion of the arm from the scan configuration to a grasp, and after it.
 
     After the grasp it runs the whole cycle where one is stored, else it goes back out.
 
@@ -40,7 +40,7 @@ class Playback:
     grasp : int
         Index of the configuration at the grasp.
     release : int
-        Index of the configuration at which the part is let go; that of the grasp
+        Index of the configuration at which the part is released; that of the grasp
         where no cycle is played.
     test_grasp : tuple of int
         layer, y, x, orientation.

@@ -1,4 +1,4 @@
-"""The points of a map, and the test frames at each: what can be shown and clicked."""
+"""The points of a map, and the test frames at each, to be shown and clicked."""
 
 from __future__ import annotations
 

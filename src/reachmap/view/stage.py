@@ -1,4 +1,4 @@
-"""The cell on a viewer's stage: solids, points, labels, in robot_base."""
+"""The cell in the viewer: solids, points, labels, in robot_base."""
 
 from __future__ import annotations
 
@@ -109,7 +109,7 @@ class Stage:
             self._part_mesh.wxyz = quaternion_wxyz_from_rotation(T[:3, :3])
 
     def redden(self, names: Iterable[str] = ()) -> None:
-        """Show some bodies in red, by name, and all others as they are."""
+        """Show some bodies in red, by name, and all others in their colours."""
         red = frozenset(names)
         for name, mesh in self._meshes:
             if (name in red) != (name in self._red):
@@ -126,7 +126,7 @@ class Stage:
         scale: float = 1.0,
         visible: bool = True,
     ) -> Any:
-        """Draw points of a map as balls; return their handle, or None for no points."""
+        """Draw points of a map as spheres; return the handle, None without points."""
         if not len(shown):
             return None
         vertices, triangles = _ball()
@@ -173,7 +173,7 @@ class Stage:
     def put_axes(
         self, T_base_frame: FloatArray | None, *, name: str = "/frame"
     ) -> None:
-        """Draw the axes of a frame, or take them away."""
+        """Draw the axes of a frame, or remove them."""
         if T_base_frame is None:
             self.scene.add_frame(name, visible=False)
             return
@@ -287,7 +287,7 @@ def _linear(rgb: CodeArray) -> CodeArray:
 
 
 def _ball() -> tuple[FloatArray, IntArray]:
-    """Unit ball that is round enough when it is small."""
+    """Unit sphere, coarse enough for small points."""
     import trimesh
 
     ball = trimesh.creation.icosphere(subdivisions=2, radius=1.0)
