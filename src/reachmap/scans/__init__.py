@@ -1,1 +1,1 @@
-"""Running many tasks: units of work, workers, journal, progress."""
+"""Scans: the outcome of every test frame and test grasp."""

@@ -1,4 +1,4 @@
-"""Results of a bin scan, grasp by grasp, and the map they make."""
+"""Results of a bin scan, grasp by grasp, and their assembly to a map."""
 
 from __future__ import annotations
 
@@ -95,7 +95,7 @@ class GraspResults:
     def blank(
         cls, grasps: int, repeats: int, dof: int, status: Status, *, stages: int = 0
     ) -> GraspResults:
-        """Results of grasps that nothing is known of."""
+        """Results of grasps without any outcome."""
         return cls(
             status=np.full(grasps, status, np.uint8),
             n_ik=np.zeros(grasps, np.uint8),
@@ -275,7 +275,7 @@ def _margins(values: FloatArray) -> Margins:
 
 
 def _best_paths(results: GraspResults) -> BestPaths:
-    """The path to each test grasp that a line would run."""
+    """The path to execute to each test grasp."""
     grasps = len(results.status)
     row = np.full(grasps, -1, np.int64)
     execution = np.full(grasps, np.nan)

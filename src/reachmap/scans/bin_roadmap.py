@@ -1,4 +1,4 @@
-"""What is known of all test grasps before attempts are made: goals, roadmap, routes."""
+"""Preparation of all test grasps before attempts: goals, roadmap, routes."""
 
 from __future__ import annotations
 
@@ -154,7 +154,7 @@ def lengths_over_roadmap(
 
 
 def roadmap_of(scene: Scene, survey: Survey) -> BinRoadmap:
-    """Connect the goals of a survey here and now."""
+    """Connect the goals of a survey in this process."""
     silent = Progress("", quiet=True)
     return _roadmap_from_payload(survey, _connection(scene, survey, silent))
 
@@ -173,7 +173,7 @@ def _connection(scene: Scene, survey: Survey, progress: Progress) -> dict[str, A
 
 
 def _roadmap_from_payload(survey: Survey, payload: Mapping[str, Any]) -> BinRoadmap:
-    """What a stage of the scan has left in the store."""
+    """Roadmap from the stored payload of a stage."""
     return BinRoadmap(
         survey=survey,
         component=payload["component"],

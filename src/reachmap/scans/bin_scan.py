@@ -48,7 +48,7 @@ GRASPS_PER_UNIT = 45
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BinContext:
-    """What a worker needs: the cell, and what is known of every test grasp.
+    """Context of a worker: the cell and the survey of every test grasp.
 
     Attributes
     ----------
@@ -73,7 +73,7 @@ class BinContext:
 
 @dataclass(frozen=True, slots=True)
 class _OneFilling:
-    """Stages of one filling among others, under names of their own."""
+    """Stages of one filling among others, under distinct names."""
 
     stages: Stages
     suffix: str
@@ -272,11 +272,11 @@ def _results(
 def _chosen(
     found: list[WayIn], after: CyclePlan | None
 ) -> tuple[list[WayIn], WayIn | None]:
-    """Ways in to keep, and the one that a line would run."""
+    """Paths to the grasp to keep, and the one to execute."""
     if after is None or after.way_in is None:
         shortest = min(found, key=lambda way: path_length_rad(way.path), default=None)
         return found, shortest
-    # What a line runs is the whole cycle, whichever way in is the shortest.
+    # What is executed is the whole cycle, even if another path to the grasp is shorter.
     best = after.way_in
     if best.repeat < 0:
         found = [*(way for way in found if way.repeat >= 0), best]

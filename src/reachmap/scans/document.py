@@ -1,4 +1,4 @@
-"""What is the same for every frame of a scan: cell, settings, names, stamp."""
+"""Data shared by all frames of a scan: cell, settings, names, stamp."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What every test frame offers a planner: free goals, or the reason there are none."""
+"""The goals of every test frame, or the reason why it has none."""
 
 from __future__ import annotations
 
@@ -130,7 +130,7 @@ class Survey:
         )
 
     def payload(self) -> dict[str, Any]:
-        """What a store keeps of it."""
+        """Its JSON payload for the journal."""
         return {
             f.name: value
             for f in dataclasses.fields(self)

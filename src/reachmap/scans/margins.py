@@ -1,4 +1,4 @@
-"""Margins of a path: what is left before a body, a joint limit, a singularity."""
+"""Margins of a path: distance to bodies, joint limits and singularities."""
 
 from __future__ import annotations
 

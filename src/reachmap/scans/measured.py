@@ -1,4 +1,4 @@
-"""What is measured of an attempt that found a path."""
+"""Measurements of an attempt that found a path."""
 
 from __future__ import annotations
 

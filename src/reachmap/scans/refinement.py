@@ -1,4 +1,4 @@
-"""Grasps between the test grasps, whose verdict alone is found: where the map doubts.
+"""Grasps between the test grasps, with verdicts only, where the map is uncertain.
 
 A test grasp stands for a box of places and a cone of directions, and a boundary of
 what is reachable runs through many of them. Where the roll is free, further grasps are
@@ -99,7 +99,7 @@ def refine(scene: Scene, stages: Stages) -> Refinement | None:
 
 
 def whole_volume(cell: Cell) -> GraspVolume:
-    """What the test grasps stand for, sideways all of the bin."""
+    """The volume that the test grasps represent, sideways the whole bin."""
     T_base_bin, spec = cell.T_base_bin(), cell.bin_scan
     grid = bin_test_frames(cell, T_base_bin)
     half = np.array(cell.bin.inner[:2]) / 2
@@ -124,7 +124,7 @@ def _sizes(total: int) -> list[int]:
 def _in_doubt(
     T: FloatArray, surveys: list[Survey], asked: FloatArray, cell: Cell
 ) -> IntArray:
-    """Which poses are least sure to have a goal or none, the least sure first."""
+    """Poses whose reachability is least certain, the least certain first."""
     axis = cell.robot.tcp.approach_axis
     has_goal = np.concatenate([s.status == Status.NOT_ATTEMPTED for s in surveys])
     regression = GraspRegression.fit(

@@ -1,4 +1,4 @@
-"""Where the roll is free, a test grasp is a direction: any of its rolls will do."""
+"""Free rolls: test grasps that differ by a free roll share their goals."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ AT_ONCE = 4
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RollGroups:
-    """Test grasps that differ by a roll that does not matter.
+    """Groups of test grasps that differ by a free roll.
 
     Attributes
     ----------
@@ -198,7 +198,7 @@ def _roll_between(R_from: FloatArray, R_to: FloatArray, axis: str) -> float:
 
 
 def _turns(tool: ToolSpec) -> FloatArray:
-    """Rolls besides the first that will do, each far from those before it [rad]."""
+    """Equivalent rolls besides the first, each far from those before it [rad]."""
     return _halving(tool.count()).astype(float) * TURN_RAD / tool.count()
 
 

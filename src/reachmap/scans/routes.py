@@ -55,7 +55,7 @@ class WayIn(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Routes:
-    """How test grasps are reached over the roadmap; what a worker is sent of it.
+    """Routes to test grasps over the roadmap, as sent to workers.
 
     Attributes
     ----------
@@ -114,7 +114,7 @@ class Routes:
         return cls(paths=paths, node=node, network=network)
 
     def payload(self) -> dict[str, Any]:
-        """What a store keeps of them."""
+        """Their JSON payload for the journal."""
         network = self.network
         return {
             "paths": dataclasses.asdict(self.paths),
@@ -124,7 +124,7 @@ class Routes:
 
     @classmethod
     def from_payload(cls, payload: Mapping[str, Any]) -> Routes:
-        """What a store has kept."""
+        """Restore from a payload."""
         network = payload["network"]
         return cls(
             paths=ShortestPaths(**payload["paths"]),

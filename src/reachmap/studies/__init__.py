@@ -1,1 +1,1 @@
-"""Studies: variants of a cell, what they reach, and which change is more than noise."""
+"""Studies: variants of a cell, their objectives, and which changes are significant."""

@@ -1,4 +1,4 @@
-"""From the payloads of variants to the study, as resumable runs want it."""
+"""From the payloads of variants to the study, for resumable runs."""
 
 from __future__ import annotations
 
@@ -150,7 +150,7 @@ def _values(
 def _changes(
     outcomes: Sequence[Mapping[str, Outcomes]], names: Sequence[str], base: int
 ) -> dict[str, Any]:
-    """Every variant against the base, and what is more than chance among them all."""
+    """Every variant against the base, and which changes are significant among all."""
     nothing = Change()
     table = [
         [
@@ -189,7 +189,7 @@ def work_on_cells(
     job: Callable[[Stages], Job],
     document: dict[str, Any],
 ) -> Work:
-    """Work of a study whose cells are known beforehand, with a unit for each."""
+    """Work of a study with a fixed list of cells, one unit each."""
     return Work(
         kind=KIND,
         units=units,

@@ -1,4 +1,4 @@
-"""The design of a study: what is varied, and the variants that this gives."""
+"""The design of a study: what is varied, and the resulting variants."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ class Variant:
         )
 
     def row(self, factors: Sequence[Factor]) -> dict[str, Any]:
-        """What a study holds of it before it is computed."""
+        """Its row in the study before it is computed."""
         return {
             "values": list(self.values),
             "assignment": self.assignment(factors),

@@ -1,4 +1,4 @@
-"""A work computed at once, in this process, with no store: a part of a larger unit."""
+"""A work computed immediately in this process, without a journal."""
 
 from __future__ import annotations
 

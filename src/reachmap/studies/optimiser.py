@@ -24,7 +24,7 @@ Place = tuple[float, ...]
 
 
 class Optimiser:
-    """Proposes variants from what others were worth; the same seed, the same ones.
+    """Proposes variants from results so far; the same seed gives the same ones.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ class Optimiser:
             yield [variant_at(self._factors, place) for place in places]
 
     def tell(self, worth: Sequence[float]) -> None:
-        """Say what the variants of the last round were worth; more is better."""
+        """Report the utilities of the variants of the last round; more is better."""
         for place, value in zip(self._pending, worth, strict=True):
             self._worth[place] = value
             trial = self._trials.pop(place, None)
@@ -91,7 +91,7 @@ class Optimiser:
             self._study.tell(trial, value)
 
     def _asked(self, places: Sequence[Place]) -> Place:
-        """What the sampler proposes, if it is new; else the first that is."""
+        """The sampler's proposal if it is new; else the first untried one."""
         for _ in range(ASKED):
             trial = self._study.ask(self._distributions)
             place = tuple(float(trial.params[name]) for name in self._distributions)

@@ -1,4 +1,4 @@
-"""What a variant is judged by: its objectives, and the outcomes that they count."""
+"""Objectives of a variant, and the outcomes they are computed from."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ SMALL_TURN: Final = float(np.radians(TOLERANCE_DEG))
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Outcomes:
-    """Outcomes of an objective one by one, and what they come to.
+    """Outcomes of an objective one by one, and their aggregate.
 
     Attributes
     ----------
@@ -197,7 +197,7 @@ def _mean(key: FloatArray, lengths: FloatArray) -> Outcomes:
 
 
 def compare_outcomes(name: str, before: Outcomes, after: Outcomes) -> Change:
-    """Compare two variants on what both have an outcome of."""
+    """Compare two variants on the outcomes that both have."""
     in_a, in_b = _matches(before.key, after.key)
     a, b = before.result[in_a], after.result[in_b]
     if name in MEANS:
@@ -262,7 +262,7 @@ class Requirement:
         return f"{self.objective} {self.operator} {self.bound:g}"
 
     def holds(self, values: Mapping[str, float]) -> bool:
-        """Whether it is met; what has no value meets nothing."""
+        """Whether it is met; a missing value meets nothing."""
         return OPERATORS[self.operator](values[self.objective], self.bound)
 
 
@@ -279,7 +279,7 @@ FAILED, UNMET = -1e9, -1e6
 def worth(
     payload: Mapping[str, Any], objective: str, requirements: Sequence[Requirement]
 ) -> float:
-    """What a variant is worth; more is better."""
+    """Utility of a variant; more is better."""
     values = {
         name: float(found["value"]) for name, found in payload["outcomes"].items()
     }

@@ -122,7 +122,7 @@ def connect(
 
 @dataclass(slots=True, eq=False)
 class _Component:
-    """Goals that share one fate, and what was tried."""
+    """Goals that are reached or lost together, and what was tried."""
 
     members: IntArray
     checks: IntArray
@@ -229,7 +229,7 @@ class _Connector:
             attempt = self._component(np.zeros(0, np.int64))
 
     def _search_long(self, part: _Component) -> bool:
-        """Plan once more, for longer, where much is at stake."""
+        """Plan once more, for longer, where many frames are open."""
         done = self._roadmap.frame_reached
         frames = np.unique(self._roadmap.goals.frame)
         if np.mean(~done[frames]) <= _MUCH:

@@ -1,4 +1,4 @@
-"""A second opinion: a lazy roadmap of samples around what planners did not reach.
+"""Second opinion: a lazy roadmap of samples around what planners did not reach.
 
 It shares no search with the planners. From the goals that are still open it goes
 outwards, over straight motions that are verified when the search wants to walk them,

@@ -1,4 +1,4 @@
-"""The straight way of a part out of the bin, and what it may touch at first.
+"""The straight lift of a part out of the bin, and its allowed initial contacts.
 
 A part lies on the bottom or among other parts, so it starts in contact. While it is
 moved without turning, its lowest point says all about the bottom, and how far it has
@@ -129,7 +129,7 @@ class Lifts:
         return float((self._part.points @ T_bin_tcp[2, :3]).min() + T_bin_tcp[2, 3])
 
     def _contact(self, lowest_m: float, rise: float) -> Lift | None:
-        """What the part lies on and in forbids; None where all is well."""
+        """Forbidden contact of the part with bottom, walls or heap, or None."""
         spec = self._spec
         bottom, heap = self._bottom, f"part | {HEAP}"
         if lowest_m < -spec.contact_allowance_m - _ROUNDING_M:

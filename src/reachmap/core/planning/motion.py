@@ -1,4 +1,4 @@
-"""Is a straight joint-space motion free, at the two resolutions of the cell.
+"""Whether a straight joint-space motion is free, at the two resolutions of the cell.
 
 *Planning step*: configurations no further apart than a joint-space step are checked.
 This is for searching.

@@ -115,7 +115,7 @@ class FoundPath:
 
 
 class OmplSearch:
-    """A planner of the cell's kind, made afresh for each search.
+    """The cell's planner, created for each search.
 
     Parameters
     ----------
@@ -127,8 +127,8 @@ class OmplSearch:
         self._motions, self._spec = motions, spec
 
     @property
-    def may_begin_anew(self) -> bool:
-        """Whether a search that is cut short has lost little."""
+    def may_restart(self) -> bool:
+        """Whether interrupting the search loses little."""
         return self._spec.name not in _OPTIMISING | _BATCH
 
     def search(

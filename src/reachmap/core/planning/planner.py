@@ -60,7 +60,7 @@ class PlanResult:
 
     @classmethod
     def without_search(cls, path: FloatArray, goal: int = 0) -> PlanResult:
-        """A path that was known before."""
+        """Result for a path that was already known."""
         return cls(
             path=path,
             goal=goal,
@@ -74,7 +74,7 @@ class PlanResult:
 
 
 class Planner:
-    """A planner of the cell's kind, made afresh for each attempt.
+    """The cell's planner, created for each attempt.
 
     Parameters
     ----------
@@ -182,7 +182,7 @@ class Planner:
     def _first_allowance(self, budget: Budget) -> int:
         """Checks of the first search, all there are for planners that make one."""
         restart = self.spec.restart_checks
-        if restart is None or not self._ompl.may_begin_anew:
+        if restart is None or not self._ompl.may_restart:
             return budget.checks
         return restart
 

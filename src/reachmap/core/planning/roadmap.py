@@ -24,7 +24,7 @@ START = 0
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Goals:
-    """What a roadmap is to reach: any one goal of each frame.
+    """Goals of a roadmap: any one goal of each frame has to be reached.
 
     Attributes
     ----------

@@ -48,7 +48,7 @@ def shorten_until(
     rng: np.random.Generator,
     least_gain: float,
 ) -> FloatArray:
-    """Cut corners and leave out waypoints until that stops gaining.
+    """Cut corners and skip waypoints until that no longer shortens the path.
 
     Parameters
     ----------

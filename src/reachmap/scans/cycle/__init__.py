@@ -1,1 +1,1 @@
-"""What follows the grasp: lift, transfer to a drop-off, retreat, return."""
+"""The cycle after the grasp: lift, transfer to a drop-off, retreat, return."""

@@ -1,4 +1,4 @@
-"""What can be said against a cell's pick cycle before any scan."""
+"""Warnings about a cell's pick cycle before any scan."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def cycle_warnings(loaded: LoadedCell) -> list[str]:
-    """Sentences about a part that has no room, and drop-offs that are out of reach."""
+    """Warnings about a part that does not fit, and drop-offs that are out of reach."""
     scenes = CycleScenes.of(loaded)
     if scenes is None:
         return []
@@ -27,7 +27,7 @@ def cycle_warnings(loaded: LoadedCell) -> list[str]:
 
 
 def drop_off_warnings(scenes: CycleScenes) -> list[str]:
-    """Sentences about drop-offs at which nothing can be put down."""
+    """Warnings about drop-offs at which nothing can be put down."""
     loaded = scenes.empty.loaded
     warnings = []
     for spec in loaded.cell.drop_offs:

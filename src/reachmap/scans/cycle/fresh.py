@@ -1,4 +1,4 @@
-"""A cycle planned from nothing, as a cell would that has no map."""
+"""A cycle planned from scratch, without a map."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _MOST_TRIES = 8
 
 
 class FreshCycle(NamedTuple):
-    """What became of a cycle that was planned from nothing.
+    """Outcome of a cycle planned from scratch.
 
     Attributes
     ----------
@@ -37,7 +37,7 @@ class FreshCycle(NamedTuple):
 
 
 class FreshCycles:
-    """Plans cycles one by one with the cell's planner, over no roadmap.
+    """Plans cycles one by one with the cell's planner, without a roadmap.
 
     Parameters
     ----------

@@ -72,7 +72,7 @@ class LiftSurvey:
         )
 
     def verdict(self, goals: IntArray) -> tuple[int, int]:
-        """Status of a grasp none of whose goals has a lift, and the pair to blame."""
+        """Status of a grasp without any lift, and the pair of bodies in the way."""
         status = self.status[goals]
         for code in NEAREST_TO_SUCCESS:
             if (status == code).any():
@@ -85,7 +85,7 @@ class LiftSurvey:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class LiftContext:
-    """What a worker needs: the cell, and configurations (n, dof) at grasps."""
+    """Context of a worker: the cell, and configurations (n, dof) at grasps."""
 
     loaded: LoadedCell
     body_pairs: tuple[str, ...]

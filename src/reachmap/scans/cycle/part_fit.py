@@ -1,4 +1,4 @@
-"""Whether the part of a cell can be in its bin at all."""
+"""Whether the part of a cell fits in its bin at all."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Configurations at which the part is put down, and the way back from each."""
+"""Configurations at which the part is put down, and the return from each."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _SEED = 1 << 21
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Places:
-    """Configurations at which the part may be let go.
+    """Configurations at which the part may be released.
 
     Attributes
     ----------
@@ -61,12 +61,12 @@ class Places:
         freeze(self)
 
     def payload(self) -> dict[str, Any]:
-        """What a store keeps of them."""
+        """Their JSON payload for the journal."""
         return dataclasses.asdict(self)
 
     @classmethod
     def from_payload(cls, payload: Mapping[str, Any]) -> Places:
-        """What a store has kept."""
+        """Restore from a payload."""
         ways = {name: Ways(**payload[name]) for name in ("place", "retreat", "back")}
         return cls(**{**payload, **ways})
 
@@ -81,7 +81,7 @@ def find_places(
     lifted: FloatArray,
     progress: Progress,
 ) -> Places:
-    """Find where the part may be let go.
+    """Find where the part may be released.
 
     Parameters
     ----------
@@ -128,7 +128,7 @@ def find_places(
 
 
 def drop_off_poses(cell: Cell, spec: DropOffSpec) -> FloatArray:
-    """Poses T_base_tcp that will do for a drop-off given by a pose, (n, 4, 4)."""
+    """Equivalent poses T_base_tcp of a drop-off given by a pose, (n, 4, 4)."""
     assert spec.pose is not None
     count = spec.turns(cell.tool.rolls)
     turns = [yaw_transform(0, 0, 0, 2 * np.pi * k / count) for k in range(count)]

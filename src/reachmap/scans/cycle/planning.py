@@ -1,4 +1,4 @@
-"""The quickest whole cycle over a test grasp: way in, lift, transfer and way back."""
+"""The quickest whole cycle over a test grasp: approach, lift, transfer and return."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ _SEED = 1 << 20
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class CycleKnowledge:
-    """What all test grasps share.
+    """Knowledge shared by all test grasps.
 
     Attributes
     ----------
@@ -178,7 +178,7 @@ class CyclePlanner:
         return best
 
     def _least_s(self, goal: int) -> float:
-        """Time below which no cycle over a goal stays."""
+        """Lower bound of the time of a cycle over a goal."""
         scenes, way = self._scenes, self._survey.way_of(goal)
         lift = self._lifts.ways[goal]
         start = scenes.empty.scan_configuration
@@ -293,7 +293,7 @@ class CyclePlanner:
         return self._way_s(lift), path_length_rad(lift)
 
     def _without_place(self, goals: IntArray) -> CyclePlan:
-        """No drop-off can be used: the stage that fails, and the bodies in the way."""
+        """Failure where no drop-off is usable: the stage, and the bodies in the way."""
         places = self._places
         row = int(np.argmax(places.status))
         status = int(places.status[row])

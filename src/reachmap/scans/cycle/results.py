@@ -1,4 +1,4 @@
-"""Cycles over all test grasps, as units hand them over and as the map holds them."""
+"""Cycles over all test grasps, as payloads of units and as a section of the map."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ class CycleResults:
 
     @classmethod
     def blank(cls, grasps: int, stages: int) -> CycleResults:
-        """Results of grasps that nothing is known of."""
+        """Results of grasps without any outcome."""
         return cls(
             status=np.full((grasps, stages), StageStatus.NOT_ATTEMPTED, np.uint8),
             blocking_pair=np.full((grasps, stages), NO_PAIR, np.int64),

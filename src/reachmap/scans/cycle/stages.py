@@ -1,4 +1,4 @@
-"""What all cycles of a scan share, worked out before the test grasps one by one."""
+"""Stages shared by all cycles of a scan, computed before single test grasps."""
 
 from __future__ import annotations
 
@@ -108,7 +108,7 @@ def places_among(frame: IntArray, more: IntArray) -> IntArray:
 
 
 def _without_lift(survey: Survey, lifts: LiftSurvey, *, is_round: bool) -> IntArray:
-    """Groups that are reached and have no lift, though another roll may have one."""
+    """Groups that are reached and have no lift, although another roll may have one."""
     frame, status = survey.frame, lifts.status
     lifted = frame[status == StageStatus.PATH_FOUND]
     hopeless = status == StageStatus.NOT_ATTEMPTED

@@ -45,13 +45,13 @@ class Hub:
     routes: Routes
 
     def payload(self) -> dict[str, Any]:
-        """What a store keeps of it."""
+        """Its JSON payload for the journal."""
         routes = self.routes.payload()
         return {"place": self.place, "row": self.row, "routes": routes}
 
     @classmethod
     def from_payload(cls, payload: Mapping[str, Any]) -> Hub:
-        """What a store has kept."""
+        """Restore from a payload."""
         routes = Routes.from_payload(payload["routes"])
         return cls(place=int(payload["place"]), row=payload["row"], routes=routes)
 
@@ -136,7 +136,7 @@ class Transfers:
         self._rest_s = places.time_s.sum(axis=1)
 
     def least_s(self, q: FloatArray) -> float:
-        """Time below which no transfer from q stays, with all that follows."""
+        """Lower bound of the time of a transfer from q and all that follows."""
         return float(self._bounds_s(q).min())
 
     def _bounds_s(self, q: FloatArray) -> FloatArray:
