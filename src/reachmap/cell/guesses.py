@@ -91,6 +91,11 @@ def finger_joints(robot: UrdfDescription, base: str) -> set[str]:
     return _Tree.of(robot, base).fingers()
 
 
+def joints_below(robot: UrdfDescription, base: str) -> set[str]:
+    """Joints that move something against the base."""
+    return {name for link in robot.links for name in robot.chain(base, link)}
+
+
 def other_tips(robot: UrdfDescription, base: str, tip: str) -> list[str]:
     """Say which arms a robot has beside the one that ends at ``tip``."""
     tree = _Tree.of(robot, base)

@@ -158,14 +158,8 @@ def _check_joints(
     ]
     for location, known in tables:
         table = at(data, *location)
-        if known is None or not isinstance(table, dict):
-            continue
-        for name in table:
-            if name not in known:
-                hint = did_you_mean(name, known)
-                document.add(
-                    (*location, name), f"not a joint that moves; {hint}", of_key=True
-                )
+        if known is not None and isinstance(table, dict):
+            _check_keys(document, location, known)
     if moving is None:
         return
     redundant = text_at(data, "robot", "ik", "redundant_joint")
@@ -175,6 +169,21 @@ def _check_joints(
             ("robot", "ik", "redundant_joint"),
             f"{redundant!r} is not a joint that moves; {hint}",
         )
+
+
+def _check_keys(document: Document, location: Location, known: Collection[str]) -> None:
+    """Add a mistake for every key of a table that is not one of the joints."""
+    locked = at(document.data, "robot", "locked_joints_deg")
+    locked = locked if isinstance(locked, dict) else {}
+    for name in at(document.data, *location):
+        if name in known:
+            continue
+        hint = (
+            "it is held by robot.locked_joints_deg"
+            if name in locked and location != ("robot", "locked_joints_deg")
+            else did_you_mean(name, known)
+        )
+        document.add((*location, name), f"not a joint that moves; {hint}", of_key=True)
 
 
 def _check_srdf_names(document: Document, srdf: SrdfDescription | None) -> None:
@@ -202,12 +211,7 @@ def _check_joint_values(
         table = at(document.data, *location)
         if not isinstance(table, dict):
             continue
-        for name in table:
-            if name not in moving:
-                hint = did_you_mean(name, moving)
-                document.add(
-                    (*location, name), f"not a joint that moves; {hint}", of_key=True
-                )
+        _check_keys(document, location, moving)
         unknown = [name for name in table if name not in moving]
         missing = [
             name

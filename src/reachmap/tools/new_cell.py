@@ -13,7 +13,6 @@ from reachmap._typing import FloatArray
 from reachmap.cell import guesses
 from reachmap.cell.files.moveit_config import planning_group
 from reachmap.cell.files.srdf import srdf_text
-from reachmap.cell.files.urdf import UrdfDescription
 from reachmap.cell.loading import LoadedCell, cell_from_text, check_storable
 from reachmap.cell.starter import (
     BINS_M,
@@ -169,7 +168,8 @@ def _first_choices(
     if source.moveit is not None:
         fingers = guesses.finger_joints(robot, chosen_base)
         group = planning_group(robot, source.moveit, fingers)
-    group = tuple(n for n in group if base is None or n in _below(robot, chosen_base))
+    below = guesses.joints_below(robot, chosen_base)
+    group = tuple(n for n in group if base is None or n in below)
     chosen_tip = tip or guesses.guess_tip(robot, chosen_base, group)
     chain = robot.chain(chosen_base, chosen_tip)
     names = [n for n in chain if tip or not group or n in group]
@@ -178,6 +178,8 @@ def _first_choices(
             f"{source.label}: no joint moves between {chosen_base!r} and {chosen_tip!r}"
         )
     joints = [robot.joints[name] for name in names]
+    # What drives a joint of the arm from beside is not to be held by a guess.
+    driving = {joint.mimics for joint in robot.way(chosen_base, chosen_tip)}
     return StarterChoices(
         name=cell_name(robot.name or Path(source.label).stem),
         urdf=source.urdf,
@@ -193,7 +195,7 @@ def _first_choices(
         locked={
             joint.name: round(user_value(joint, middle_position(joint)), 4)
             for joint in robot.joints.values()
-            if joint.moves and joint not in joints
+            if joint.moves and joint not in joints and joint.name not in driving
         },
         scan_deg={j.name: round(user_value(j, middle_position(j)), 4) for j in joints},
     )
@@ -361,11 +363,6 @@ class _Attempt:
             for name, values in ({} if moveit is None else moveit.states).items()
             if all(joint.name in values for joint in self.choices.joints)
         }
-
-
-def _below(robot: UrdfDescription, base: str) -> set[str]:
-    """Joints that move something against the base."""
-    return {name for link in robot.links for name in robot.chain(base, link)}
 
 
 def _body_lines(source: RobotSource, arm: RobotModel) -> list[str]:

@@ -105,6 +105,13 @@ def test_chains_leave_out_what_does_not_move() -> None:
             robot(*CHAIN, '<gazebo><origin xyz="1 2 x"/></gazebo>'),
             "<origin xyz>: expected 3 finite numbers",
         ),
+        (
+            robot(*CHAIN).replace(
+                LIMIT, LIMIT + '<mimic joint="ab" multiplier="inf"/>'
+            ),
+            "multiplier: expected a finite number",
+        ),
+        (robot(*CHAIN).replace('"ab"', '"universe"'), "Pinocchio keeps this name"),
         (robot(links=[f"l{i}" for i in range(2001)]), "more than 2,000 links"),
     ],
 )  # fmt: skip

@@ -11,6 +11,7 @@ import pytest
 from reachmap.core.collision.bodies import build_geometry
 from reachmap.core.scene import Scene
 from reachmap.errors import CellError, SceneError
+from reachmap.tools.new_cell import new_cell
 from tests.support.small_cells import LIMIT, joint, link, load, robot
 
 BOX = '<box size="0.05 0.05 0.2"/>'
@@ -196,6 +197,53 @@ def test_coupled_joints_of_the_chain_are_refused_in_a_sentence(tmp_path: Path) -
     locked = ("robot.locked_joints_deg={j2: 30}", "scan_configuration.q_deg={j1: 0}")
     arm = Scene.build(load(tmp_path, urdf, "l3", ("j1",), locked)).robot
     assert arm.joint_names == ("j1",)
+
+
+def test_a_joint_of_the_chain_led_from_beside_is_an_axis_too(tmp_path: Path) -> None:
+    """Held still without a word it would be another arm; locked, it is meant."""
+    led = ARM[6].replace(LIMIT, LIMIT + '<mimic joint="motor" multiplier="-1"/>')
+    urdf = robot(*ARM[:6], led, link("rod"), joint("motor", "base", "rod"))
+    with pytest.raises(SceneError, match=r"'j3' .* follows 'motor'; arms with coupled"):
+        Scene.build(load(tmp_path, urdf, "l3", ("j1", "j2")))
+    locked = ("robot.locked_joints_deg={motor: 30}",)
+    arm = Scene.build(load(tmp_path, urdf, "l3", ("j1", "j2"), locked)).robot
+    _, T = arm.link_placement("l3")
+    np.testing.assert_allclose(T[0, 0], np.cos(np.pi / 6), atol=1e-12)
+    (tmp_path / "arm.urdf").write_text(urdf)
+    written = new_cell(tmp_path / "arm.urdf", output=tmp_path / "new.yaml", tip="l3")
+    assert "'j3' is between base and TCP and follows 'motor'" in written.problems[0]
+
+
+@pytest.mark.parametrize(
+    ("kind", "value", "said"),
+    [
+        ("revolute", 172, "at 172 deg is outside of its limits -171.9"),
+        ("prismatic", 20, "at 20 m is outside of its limits -3 … 3 m"),
+        ("revolute", 171.88, ""),
+        ("continuous", 720, ""),
+    ],
+)
+def test_joints_are_locked_where_they_can_be(
+    tmp_path: Path, kind: str, value: float, said: str
+) -> None:
+    """Within their limits, copied with few digits; continuous ones anywhere."""
+    urdf = robot(*ARM, link("rod"), joint("motor", "base", "rod", kind=kind))
+    locked = (f"robot.locked_joints_deg={{motor: {value}}}",)
+    loaded = load(tmp_path, urdf, "l3", JOINTS, locked)
+    if said:
+        with pytest.raises(SceneError, match=said):
+            Scene.build(loaded)
+    else:
+        Scene.build(loaded)
+
+
+def test_a_value_for_a_locked_joint_says_that_it_is_locked(tmp_path: Path) -> None:
+    """Not that it may be a misspelt one."""
+    locked = ("robot.locked_joints_deg={j2: 30}",)
+    with pytest.raises(
+        CellError, match=r"q_deg.j2: .* held by robot.locked_joints_deg"
+    ):
+        load(tmp_path, robot(*ARM), "l3", JOINTS, locked)
 
 
 def test_a_joint_that_mimics_nothing_is_one_of_its_own(tmp_path: Path) -> None:

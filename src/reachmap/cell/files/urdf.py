@@ -31,6 +31,7 @@ MOVING = ("revolute", "continuous", "prismatic")
 # Of several degrees of freedom: held at zero beside the arm, refused in it.
 FREE_JOINTS = ("floating", "planar")
 JOINT_TYPES = (*MOVING, "fixed", *FREE_JOINTS)
+GROUND = "universe"
 # Root elements of other formats that come as XML.
 OTHER_ROOTS = {
     "mujoco": "this is MJCF (MuJoCo)",
@@ -214,13 +215,20 @@ def _joint(
     lower, upper = _bounds(element, name, faults, notes) if bounded else (None, None)
     velocity = _number(limit, "velocity", name, faults)
     factors = [
-        given if (given := _number(mimic, key, name, faults)) is not None else default
+        default
+        if (given := _number(mimic, key, name, faults, may_be_infinite=False)) is None
+        else given
         for key, default in (("multiplier", 1.0), ("offset", 0.0))
     ]
     if kind in FREE_JOINTS:
         notes.append(f"joint {name!r} is {kind}; it is held at zero")
     if kind in MOVING:
         faults += _axis_faults(element, name)
+        if name == GROUND:
+            faults.append(
+                f"joint {name!r}: Pinocchio keeps this name for the ground; rename "
+                "the joint in a copy of the URDF"
+            )
     return UrdfJoint(
         name=name,
         type=kind,
@@ -298,7 +306,12 @@ def _axis_faults(element: ElementTree.Element, name: str) -> list[str]:
 
 
 def _number(
-    element: ElementTree.Element | None, key: str, joint: str, faults: list[str]
+    element: ElementTree.Element | None,
+    key: str,
+    joint: str,
+    faults: list[str],
+    *,
+    may_be_infinite: bool = True,
 ) -> float | None:
     """Value of an attribute; None where it is not given or infinite."""
     text = None if element is None else element.get(key)
@@ -308,8 +321,10 @@ def _number(
         value = float(text)
     except ValueError:
         value = math.nan
-    if not math.isnan(value):
-        return None if math.isinf(value) else value
+    if math.isfinite(value):
+        return value
+    if math.isinf(value) and may_be_infinite:
+        return None
     given = repr(text[:40])
     faults.append(f"joint {joint!r}: {key}: expected a finite number (got {given})")
     return None

@@ -18,6 +18,9 @@ from reachmap.core.robot.urdf_joints import LINK_MARK, Follower, UrdfJoints
 from reachmap.errors import SceneError
 
 TCP_FRAME = "reachmap_tcp"
+_DEG = math.degrees(1.0)
+# Limits are copied into cells by hand, with few digits [deg or m].
+_ROUNDED = 1e-3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -120,13 +123,39 @@ def moving_joints(
         f"{leader.leader!r}; arms with coupled joints are not supported (one of the "
         "two can be locked in robot.locked_joints_deg)"
         for name, leader in urdf.followers.items()
-        if name in chain and leader.leader in moving and name not in locked
+        # A leader beside the chain is driven, too: the arm has an axis there.
+        if name in wanted
+        and name in chain
+        and (leader.leader in moving or leader.leader not in chain)
+        and not {name, leader.leader} & set(locked)
     ]
+    problems += _locked_out_of_range(urdf, locked)
     if not moving:
         problems.append("robot.joints: no joint is left that moves")
     if problems:
         raise SceneError(problems)
     return moving
+
+
+def _locked_out_of_range(urdf: UrdfJoints, locked: Mapping[str, float]) -> list[str]:
+    """Locked joints that cannot stand where they are to be held.
+
+    Followers are left out: their limits are often given carelessly.
+    """
+    problems = []
+    for name, value in locked.items():
+        joint = urdf.joints.get(name)
+        if joint is None or joint.mimics is not None or joint.type == "continuous":
+            continue
+        to_cell, unit = (1.0, "m") if joint.type == "prismatic" else (_DEG, "deg")
+        low = -math.inf if joint.lower is None else to_cell * joint.lower
+        high = math.inf if joint.upper is None else to_cell * joint.upper
+        if not low - _ROUNDED <= value <= high + _ROUNDED:
+            problems.append(
+                f"robot.locked_joints_deg: joint {name!r} at {value:g} {unit} is "
+                f"outside of its limits {low:.4g} … {high:.4g} {unit}"
+            )
+    return problems
 
 
 def locked_positions(model: Any, spec: RobotSpec, urdf: UrdfJoints) -> FloatArray:
