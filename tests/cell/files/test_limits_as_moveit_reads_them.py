@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from reachmap.cell.loading import LoadedCell
 from reachmap.core.planning.timing import execution_time_s
 from reachmap.core.robot.model import RobotModel
 from reachmap.errors import CellError, SceneError
@@ -119,9 +120,10 @@ def test_rates_of_joint_limits_files(
 @pytest.mark.parametrize(
     ("entry", "said"),
     [
-        ("max_velocity: !deg 60", "tags are not supported .got !deg"),
-        ("max_velocity: !degrees fast", "expected a number after !degrees"),
-        ("max_velocity: !degrees [1]", "tags are not supported"),
+        ("max_velocity: !deg 60", "tags other than !degrees, !radians .*.got !deg"),
+        ("max_velocity: !degrees fast", "a number after !degrees .got 'fast'"),
+        ("max_velocity: !degrees [1]", "a number after !degrees .got a list"),
+        ("max_velocity: !radians {a: 1}", "a number after !radians .got a mapping"),
         ("has_velocity_limits: maybe, max_velocity: 1", "expected true or false"),
         ("has_position_limits: true", "needs min_position or max_position"),
         ("min_position: 2, max_position: 1", "min_position must be below"),
@@ -214,6 +216,36 @@ def test_pairs_without_links_are_refused(
     (tmp_path / "r.srdf").write_text(SRDF.format(element))
     with pytest.raises(CellError, match=rf"r\.srdf{said}"):
         arm(tmp_path, "robot.srdf=r.srdf")
+
+
+HOME = (
+    '<group_state name="home" group="g">\n<joint name="j1" value="{}"/></group_state>'
+)
+
+
+def state_of_one_joint(folder: Path, *states: str) -> LoadedCell:
+    """An arm of one joint whose scan configuration is the state ``home``."""
+    (folder / "r.srdf").write_text(SRDF.format("\n".join(states)))
+    urdf = robot(link("base"), link("l1", BOX), joint("j1", "base", "l1"))
+    return load(folder, urdf, "l1", ["j1"], [
+        "robot.srdf=r.srdf", "scan_configuration={group_state: home}"])  # fmt: skip
+
+
+def test_a_joint_with_two_values_is_named_with_its_line(tmp_path: Path) -> None:
+    """Not as a state that lacks the joint; lines of comments count."""
+    with pytest.raises(CellError, match=r"r\.srdf:5: .*'home': joint 'j1': .*'1 2'"):
+        state_of_one_joint(tmp_path, "<!--\n-->" + HOME.format("1 2"))
+
+
+def test_states_of_one_name_belong_together(tmp_path: Path) -> None:
+    """Each group has its own; where they differ, the first counts and it is said."""
+    other = HOME.replace("j1", "j9").format(2)
+    loaded = state_of_one_joint(tmp_path, HOME.format(0.5), other)
+    assert loaded.scan_configuration_rad == {"j1": 0.5}
+    assert not loaded.warnings
+    loaded = state_of_one_joint(tmp_path, HOME.format(0.5), HOME.format(0.7))
+    assert loaded.scan_configuration_rad == {"j1": 0.5}
+    assert "another value of 'j1'" in loaded.warnings[0]
 
 
 def test_states_of_virtual_joints_are_passed_over(tmp_path: Path) -> None:

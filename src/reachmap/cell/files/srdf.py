@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass
 from xml.etree import ElementTree
 from xml.sax.saxutils import quoteattr
@@ -69,15 +69,14 @@ def parse_srdf(text: str, label: str, robot: UrdfDescription) -> SrdfDescription
         name: tuple(dict.fromkeys(_group_joints(element, elements, robot, 0)))
         for name, element in elements.items()
     }
-    states = {
-        element.get("name", ""): _state(element, label)
-        for element in root.findall("group_state")
-    }
     faults: list[str] = []
+    notes: list[str] = []
+    places = _places(root, text, label)
+    states = _states(root, robot, places, faults, notes)
     found = {
         tag: [
-            tuple(_attribute(element, key, where, faults) for key in keys)
-            for where, element in _placed(root, tag, text, label)
+            tuple(_attribute(element, key, places[element], faults) for key in keys)
+            for element in root.findall(tag)
         ]
         for tag, keys in _PAIR_ELEMENTS.items()
     }
@@ -86,14 +85,15 @@ def parse_srdf(text: str, label: str, robot: UrdfDescription) -> SrdfDescription
     named = {link for rows in found.values() for row in rows for link in row}
     unknown = sorted(named - set(robot.links))
     shown = ", ".join(unknown[:10]) + (", …" if len(unknown) > 10 else "")
-    note = f"{label}: ignored, collisions of links not in the URDF: {shown}"
+    if unknown:
+        notes.append(f"{label}: ignored, collisions of links not in the URDF: {shown}")
     return SrdfDescription(
         groups=groups,
         states=states,
         disabled_pairs=tuple((a, b) for a, b in found["disable_collisions"]),
         disabled_links=tuple(a for (a,) in found["disable_default_collisions"]),
         enabled_pairs=tuple((a, b) for a, b in found["enable_collisions"]),
-        notes=(note,) if unknown else (),
+        notes=tuple(notes),
     )
 
 
@@ -104,22 +104,24 @@ _PAIR_ELEMENTS = {
 }
 
 
-def _placed(
-    root: ElementTree.Element, tag: str, text: str, label: str
-) -> Iterator[tuple[str, ElementTree.Element]]:
-    """Elements directly below the root, each with file and line."""
-    # ElementTree forgets lines; the n-th start tag that is not a comment is its own.
-    starts = [
-        match.start(1)
-        for match in re.finditer(rf"<!--.*?-->|<({tag})(?=[\s/>])", text, re.DOTALL)
-        if match[1]
-    ]
-    elements = list(root.iter(tag))
-    for element in root.findall(tag):
-        number = elements.index(element)
+def _places(
+    root: ElementTree.Element, text: str, label: str
+) -> dict[ElementTree.Element, str]:
+    """File and line of the elements that faults are found in."""
+    places = {}
+    for tag in (*_PAIR_ELEMENTS, "group_state", "joint"):
+        # ElementTree forgets lines; the n-th start tag outside comments is its own.
+        starts = [
+            match.start(1)
+            for match in re.finditer(rf"<!--.*?-->|<({tag})(?=[\s/>])", text, re.DOTALL)
+            if match[1]
+        ]
+        elements = list(root.iter(tag))
         exact = len(starts) == len(elements)
-        line = text.count("\n", 0, starts[number]) + 1 if exact else 0
-        yield (f"{label}:{line}" if exact else label), element
+        for number, element in enumerate(elements):
+            line = text.count("\n", 0, starts[number]) + 1 if exact else 0
+            places[element] = f"{label}:{line}" if exact else label
+    return places
 
 
 def _attribute(
@@ -154,7 +156,33 @@ def _group_joints(
     return [n for n in names if n in robot.joints and robot.joints[n].moves]
 
 
-def _state(element: ElementTree.Element, label: str) -> dict[str, float]:
+def _states(
+    root: ElementTree.Element,
+    robot: UrdfDescription,
+    places: dict[ElementTree.Element, str],
+    faults: list[str],
+    notes: list[str],
+) -> dict[str, dict[str, float]]:
+    """Joint positions by name of the state; several groups may have one of a name."""
+    states: dict[str, dict[str, float]] = {}
+    for element in root.findall("group_state"):
+        name = element.get("name", "")
+        values = states.setdefault(name, {})
+        for joint, value in _state(element, robot, places, faults).items():
+            if values.setdefault(joint, value) != value:
+                notes.append(
+                    f"{places[element]}: group_state {name!r} is given again with "
+                    f"another value of {joint!r}; the first one counts"
+                )
+    return states
+
+
+def _state(
+    element: ElementTree.Element,
+    robot: UrdfDescription,
+    places: dict[ElementTree.Element, str],
+    faults: list[str],
+) -> dict[str, float]:
     values: dict[str, float] = {}
     for joint in element.findall("joint"):
         name, text = joint.get("name", ""), joint.get("value", "")
@@ -162,15 +190,16 @@ def _state(element: ElementTree.Element, label: str) -> dict[str, float]:
             numbers = [float(word) for word in text.split()]
         except ValueError:
             numbers = []
-        if len(numbers) > 1:  # a virtual or planar joint, which no arm plans for
-            continue
-        value = numbers[0] if numbers else math.nan
-        if not math.isfinite(value):
-            raise CellError(
-                f"{label}: group_state {element.get('name')!r}: joint {name!r}: "
-                f"expected a finite number (got {text[:40]!r})"
+        known = robot.joints.get(name)
+        if len(numbers) > 1 and (known is None or not known.moves):
+            continue  # a virtual or planar joint, which no arm plans for
+        if len(numbers) != 1 or not math.isfinite(numbers[0]):
+            faults.append(
+                f"{places[joint]}: group_state {element.get('name')!r}: joint "
+                f"{name!r}: expected one finite number (got {text[:40]!r})"
             )
-        values[name] = value
+            continue
+        values[name] = numbers[0]
     return values
 
 

@@ -285,7 +285,8 @@ class _Builder:
     def _tagged(self, event: Any) -> float:
         value = scalar_value(event.value)
         if isinstance(value, bool) or not isinstance(value, int | float):
-            self._refuse(event, f"expected a number after {str(event.tag)[:60]}")
+            given = f"(got {event.value[:40]!r})"
+            self._refuse(event, f"expected a number after {event.tag} {given}")
         return self._tags[str(event.tag)](value)
 
     def _sequence(
@@ -333,8 +334,15 @@ class _Builder:
         if isinstance(event, AliasEvent) or getattr(event, "anchor", None):
             self._refuse(event, "anchors and aliases are not supported")
         tag = getattr(event, "tag", None)
-        if tag and not (isinstance(event, ScalarEvent) and str(tag) in self._tags):
-            self._refuse(event, f"tags are not supported (got {str(event.tag)[:60]})")
+        if not tag:
+            return
+        if str(tag) not in self._tags:
+            others = f" other than {', '.join(self._tags)}" if self._tags else ""
+            given = f"(got {str(tag)[:60]})"
+            self._refuse(event, f"tags{others} are not supported {given}")
+        if not isinstance(event, ScalarEvent):
+            kind = "list" if isinstance(event, SequenceStartEvent) else "mapping"
+            self._refuse(event, f"expected a number after {tag} (got a {kind})")
 
     def _place(self, event: Any) -> Place:
         mark = event.start_mark
