@@ -219,6 +219,18 @@ def test_collada_nodes_agree_with_the_collision_library(tmp_path: Path) -> None:
     np.testing.assert_allclose(centroids(ours), centroids(theirs), atol=1e-5)
 
 
+def test_collada_positions_are_in_the_array_that_is_named() -> None:
+    """An accessor may read the array of another source."""
+    text = """<COLLADA><library_geometries><geometry><mesh>
+    <source id="p"><float_array id="a">0 0 0 9 0 0 0 9 0</float_array>
+    <technique_common><accessor source="#b" stride="3"/></technique_common></source>
+    <source id="q"><float_array id="b">0 0 0 1 0 0 0 1 0</float_array></source>
+    <vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
+    <triangles><input semantic="VERTEX" source="#v" offset="0"/><p>0 1 2</p></triangles>
+    </mesh></geometry></library_geometries></COLLADA>"""
+    assert area(read_mesh(text.encode(), ".dae")) == pytest.approx(0.5)
+
+
 @pytest.mark.parametrize(
     ("kind", "corners"),
     [
@@ -244,6 +256,7 @@ def test_collada_primitives_cover_the_same_square(kind: str, corners: str) -> No
         ('meter="1"', 'meter="0"', "expected a number > 0"),
         ('meter="1"', 'meter="-1"', "expected a number > 0"),
         ('meter="1"', 'meter="nan"', "expected a number > 0"),
+        ('meter="1"', 'meter="0,001"', "<unit meter>: .*got '0,001'"),
         ("0 1 2 3 0 1 4", "0 1 2 3 0 1 9", "a vertex that is missing .there are 5"),
         ("0 1 2 3 0 1 4", "0 1 2 3 0 1 -1", "a vertex that is missing"),
         ("0 1 2 3 0 1 4", "0 1 2", "<polylist> is truncated"),

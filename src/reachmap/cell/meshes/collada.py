@@ -37,9 +37,7 @@ def collada_triangles(data: bytes) -> tuple[FloatArray, IntArray]:
     except ElementTree.ParseError as error:
         raise MeshError(f"not valid XML: {error}") from None
     unit = root.find("{*}asset/{*}unit")
-    metres = float(unit.get("meter", "1")) if unit is not None else 1.0
-    if not (math.isfinite(metres) and metres > 0):
-        raise MeshError(f"<unit meter>: expected a number > 0 (got {metres:g})")
+    metres = _unit_m("1" if unit is None else unit.get("meter", "1"))
     document = _Document(root)
     vertices, triangles, count, total = [], [], 0, 0
     for T, geometry in document.instances():
@@ -53,6 +51,16 @@ def collada_triangles(data: bytes) -> tuple[FloatArray, IntArray]:
     if not triangles:
         return np.empty((0, 3)), np.empty((0, 3), np.int64)
     return metres * np.concatenate(vertices), np.concatenate(triangles)
+
+
+def _unit_m(text: str) -> float:
+    try:
+        metres = float(text)
+    except ValueError:
+        metres = math.nan
+    if not (math.isfinite(metres) and metres > 0):
+        raise MeshError(f"<unit meter>: expected a number > 0 (got {text[:40]!r})")
+    return metres
 
 
 class _Document:
@@ -134,14 +142,16 @@ class _Document:
             raise MeshError("<vertices> without positions")
         source = self._named(place.get("source"))
         array = source.find("{*}float_array")
-        values = np.array(
-            (array.text or "").split() if array is not None else [], float
-        )
         accessor = source.find("{*}technique_common/{*}accessor")
         stride, offset = 3, 0
         if accessor is not None:
             stride = int(accessor.get("stride", "3"))
             offset = int(accessor.get("offset", "0"))
+            # Positions may be kept in the array of another source.
+            array = self._by_id.get(accessor.get("source", "").removeprefix("#"), array)
+        values = np.array(
+            (array.text or "").split() if array is not None else [], float
+        )
         if stride < 3 or offset < 0:
             raise MeshError("positions need three numbers each")
         values = values[offset:]
