@@ -59,6 +59,8 @@ def test_the_result_is_that_of_the_edited_file() -> None:
         ("robot.limits.velocity_rad_s={joint_9: 1}", "joint_9: not a joint that moves"),
         ("planner.name=RRTConect", "expected 'LBKPIECE1'"),
         ("scan_configuration.q_rad={}", "give exactly one of q_deg, q_rad"),
+        ("tool={roll: yes}", "expected listed, free, or N-fold such as 2-fold .got"),
+        ("bodies.0.name=a/b", "expected a name of letters, digits, .* .got 'a/b'"),
     ],
 )
 def test_wrong_assignments_name_themselves(text: str, message: str) -> None:

@@ -237,6 +237,19 @@ def test_joints_are_locked_where_they_can_be(
         Scene.build(loaded)
 
 
+def test_a_slide_whose_ends_are_left_out_says_what_that_means(tmp_path: Path) -> None:
+    """As ROS has it they are 0, which leaves no range."""
+    rail = joint("rail", "base", "foot", kind="prismatic").replace(
+        'lower="-3" upper="3" ', ""
+    )
+    foot = ARM[4].replace('"base"', '"foot"')
+    urdf = robot(*ARM[:4], link("foot"), rail, foot, *ARM[5:])
+    with pytest.raises(
+        SceneError, match=r"'rail' has no range left .* leaves out are 0"
+    ):
+        Scene.build(load(tmp_path, urdf, "l3", ("rail", *JOINTS)))
+
+
 def test_a_value_for_a_locked_joint_says_that_it_is_locked(tmp_path: Path) -> None:
     """Not that it may be a misspelt one."""
     locked = ("robot.locked_joints_deg={j2: 30}",)

@@ -9,18 +9,17 @@ from pydantic import Field
 from reachmap.cell.model.fields import Record
 
 LISTED, FREE = "listed", "free"
+ROLLS = r"^(listed|free|([2-9]|[1-9][0-9])-fold)$"
 
 
 class ToolSpec(Record):
     """How the tool may be turned about its approach axis."""
 
-    roll: Annotated[str, Field(pattern=r"^(listed|free|([2-9]|[1-9][0-9])-fold)$")] = (
-        Field(
-            LISTED,
-            description="listed: the rolls of the orientations; free: any roll, as for "
-            "a suction cup; N-fold, such as 2-fold: the tool is symmetric under 1/N of "
-            "a turn.",
-        )
+    roll: Annotated[str, Field(pattern=ROLLS)] = Field(
+        LISTED,
+        description="listed: the rolls of the orientations; free: any roll, as for "
+        "a suction cup; N-fold, such as 2-fold: the tool is symmetric under 1/N of "
+        "a turn.",
     )
     rolls: int = Field(
         24, ge=2, le=360, description="Rolls tried per direction where roll is free."

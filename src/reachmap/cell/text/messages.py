@@ -10,7 +10,8 @@ from typing import Annotated, Any, Union, get_args, get_origin
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
-from reachmap.cell.model.fields import MAX_LENGTH_M
+from reachmap.cell.model.fields import MAX_LENGTH_M, NAMES
+from reachmap.cell.model.tool import ROLLS
 from reachmap.cell.text.yaml_reader import Document, Location
 
 
@@ -95,6 +96,11 @@ _BOUNDS = {
     "string_too_long": ("text of at most {} characters", "max_length"),
     "string_pattern_mismatch": ("text that matches {}", "pattern"),
 }
+# What patterns mean; others stand for themselves.
+_PATTERNS = {
+    NAMES: "a name of letters, digits, spaces and . - _",
+    ROLLS: "listed, free, or N-fold such as 2-fold",
+}
 
 
 def add_validation_errors(
@@ -159,6 +165,8 @@ def _sentence(
     if kind in _BOUNDS:
         pattern, key = _BOUNDS[kind]
         bound = context[key]
+        if bound in _PATTERNS:
+            return f"expected {_PATTERNS[bound]} {found}"
         words = pattern.format(f"{bound:g}" if isinstance(bound, float) else bound)
         metres = (
             "; lengths are in metres" if bound in (MAX_LENGTH_M, -MAX_LENGTH_M) else ""

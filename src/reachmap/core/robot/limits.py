@@ -117,9 +117,15 @@ def _position(
         unit = "rad" if turns else "m"
         problems.append(
             f"robot.limits: joint {joint.name!r} has no range left "
-            f"(lower {low:.6g}, upper {high:.6g} {unit})"
+            f"(lower {low:.6g}, upper {high:.6g} {unit}){_left_out(joint)}"
         )
     return low, high
+
+
+def _left_out(joint: UrdfJoint) -> str:
+    if joint.lower == joint.upper == 0:
+        return "; ends that the URDF's <limit> leaves out are 0"
+    return ""
 
 
 def _jerks(
