@@ -151,3 +151,13 @@ def test_the_other_arms_are_named() -> None:
         )
         == []
     )
+
+
+def test_the_fingers_of_another_arm_are_no_arms() -> None:
+    """However many joints they have, they are beyond its flange."""
+    second = [f"{a}>{b} revolute" for a, b in pairwise(["l0", *"abcdef"])]
+    hand = [f"f>f_{finger}1 revolute" for finger in "pqr"]
+    hand += [f"f_{x}{k}>f_{x}{k + 1} revolute" for x in "pqr" for k in range(1, 6)]
+    found = robot("l6>tool0 fixed", *second, "f>f_tool_link fixed", *hand)
+    (note,) = other_tips(found, "l0", "tool0")
+    assert note.endswith("--tip takes another: f_tool_link")

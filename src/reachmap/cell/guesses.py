@@ -102,7 +102,17 @@ def other_tips(robot: UrdfDescription, base: str, tip: str) -> list[str]:
     fingers, own = tree.fingers(), tree.chains[tip]
     fewest = max(ARM_JOINTS, tree.independent(tip) / 2)
     ends: dict[str, list[str]] = {}
+    flanges = {
+        tree.chains[link]
+        for link in tree.chains
+        if known_tip(link) is not None and tree.independent(link) >= fewest
+    }
     for link, chain in tree.chains.items():
+        # What moves beyond a flange is its hand.
+        if known_tip(link) is None and any(
+            chain[:k] in flanges for k in range(len(chain))
+        ):
+            continue
         enough = tree.independent(link) >= fewest
         beside = enough and chain[-1] not in own and own[-1] not in chain
         if beside and not fingers.intersection(chain):
