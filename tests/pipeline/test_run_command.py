@@ -11,7 +11,17 @@ from click.testing import CliRunner, Result
 from reachmap.cli import group
 from reachmap.maps import read_bin_map, read_placement, read_workspace_map
 
-SMALL = ("--set", "bin_scan.grid=[3,2]", "-j", "1", "--no-progress")
+SIZES = (
+    "bin_scan.grid=[3,2]",
+    "workspace_scan.cubes.0.grid=[8,4]",
+    "workspace_scan.cubes.1.grid=[8,4]",
+)
+SMALL = (
+    *(word for size in SIZES for word in ("--set", size)),
+    "-j",
+    "1",
+    "--no-progress",
+)
 
 
 def run(*arguments: object) -> Result:

@@ -9,7 +9,14 @@ from tests.support.command_line import reachmap
 
 def test_bin_scan_takes_the_cell_of_the_workspace_map(tmp_path):
     """Without a placement the bin stands where the scanned cell has it."""
-    assert reachmap(tmp_path, "workspace-scan", "planar-toy").returncode == 0
+    sizes = (
+        "bin_scan.grid=[3,2]",
+        "workspace_scan.cubes.0.grid=[8,4]",
+        "workspace_scan.cubes.1.grid=[8,4]",
+    )
+    words = [word for size in sizes for word in ("--set", size)]
+    scan = reachmap(tmp_path, "workspace-scan", "planar-toy", *words)
+    assert scan.returncode == 0, scan.stderr
     result = reachmap(tmp_path, "bin-scan")
     assert result.returncode == 0, result.stderr
     assert "using the bin pose of workspace.h5" in result.stderr
