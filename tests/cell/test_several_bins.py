@@ -138,8 +138,11 @@ def test_carriers_and_supports_are_of_each(tmp_path):
         ("bins.right.inner=[1, 2]", "bins.right.inner.2: a value is missing"),
         ("bins.left.on=shelf", "bins.left.on: 'shelf' is not a body"),
         ("bins.right.on=shelf", "bins.right.on: 'shelf' is not a body"),
-        ("bins.left.pose.rpy_deg=[90, 0, 0]", "bins.left.pose: the bin stands 90 deg"),
-        ("bins.right.pose.rpy_deg=[90, 0, 0]", "bins.right.pose: the bin stands 90"),
+        (
+            "bins.left.pose.rpy_deg=[90, 0, 0]",
+            "bins.left.pose: the bin is tilted 90 deg",
+        ),
+        ("bins.right.pose.rpy_deg=[90, 0, 0]", "bins.right.pose: the bin is tilted 90"),
         ("bins.left.touch=[shelf]", "bins.left.touch.0: no link or body 'shelf'"),
         ("bin.wall=0.1", "bin: give bin or bins, not both"),
         ("bins.left.name=other", "bins.left.name: the name of a bin is its key"),

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import ConvexHull, QhullError
 
 from reachmap._typing import FloatArray
 from reachmap.cell.model.bodies import BinSpec, BodySpec
@@ -68,6 +67,9 @@ def top_faces(cell: Cell, T_to_world: FloatArray) -> tuple[TopFace, ...]:
 
 
 def _top_face(body: BodySpec, T_to_parent: FloatArray) -> TopFace | None:
+    # Imported here: it takes long, and few cells stand their bins on bodies.
+    from scipy.spatial import ConvexHull, QhullError
+
     points = triangles_of(body.shape).vertices
     T = T_to_parent @ body.pose.matrix()
     points = points @ T[:3, :3].T + T[:3, 3]

@@ -9,7 +9,6 @@ from dataclasses import dataclass, field
 from typing import Any, TypeAlias
 
 import numpy as np
-from scipy.spatial import ConvexHull
 
 from reachmap._typing import FloatArray, IntArray
 from reachmap.cell.model.fields import Shape
@@ -169,6 +168,9 @@ def _box(sides_m: FloatArray) -> TriangleMesh:
 
 def _hull(points: FloatArray) -> TriangleMesh:
     """Surface of a convex hull; triangles share no corners: edges stay sharp."""
+    # Imported here: it takes long, and most shapes are boxes and cylinders.
+    from scipy.spatial import ConvexHull
+
     hull = ConvexHull(points)
     corners = points[hull.simplices]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])

@@ -10,7 +10,6 @@ smooth curve in the joints, and has the time optimum of that curve.
 from __future__ import annotations
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from reachmap._typing import FloatArray
 
@@ -125,6 +124,9 @@ def smooth_way_time_s(
     way = way[np.concatenate([[True], chords > 1e-12])]
     if len(way) < 3:
         return execution_time_s(way, velocity, acceleration)
+    # Imported here: splines take long to import, and few commands time a way.
+    from scipy.interpolate import CubicSpline
+
     knots = np.concatenate([[0.0], np.cumsum(chords[chords > 1e-12])])
     s = np.linspace(0.0, knots[-1], GRID + 1)
     spline = CubicSpline(knots, way)

@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from reachmap._typing import FloatArray
 from reachmap.core.planning.timing import merge_straight
@@ -73,6 +72,9 @@ def smooth_way_time_s(
     if len(way) < 3:
         return polyline_time_s(way, velocity, acceleration, jerk)
     knots = np.concatenate([[0.0], np.cumsum(chords[chords > 1e-12])])
+    # Imported here: splines take long to import, and few commands time a way.
+    from scipy.interpolate import CubicSpline
+
     curve = CubicSpline(knots, way)
     length = float(knots[-1])
     steepest = np.abs(curve(np.linspace(0.0, length, SAMPLES), 1)).max(axis=0)
