@@ -63,7 +63,8 @@ def test_a_scan_configuration_in_collision_names_the_bodies(toy):
 
 def test_a_map_of_the_wrong_kind_is_named(toy):
     """A workspace map where a bin map is expected says what it is."""
-    coarse = "workspace_scan.cubes=[{name: one, min: [0.2, 0, 0], max: [0.4, 0, 0], grid: [2, 1]}]"
+    cube = "{name: one, min: [0.2, 0, 0], max: [0.4, 0, 0], grid: [2, 1]}"
+    coarse = f"workspace_scan.cubes=[{cube}]"
     scan = reachmap(toy, "workspace-scan", "cell.yaml", "--set", coarse)
     assert scan.returncode == 0, scan.stderr
     (toy / "grasps.json").write_text(
