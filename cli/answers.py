@@ -11,7 +11,7 @@ import click
 from reachmap.cli.terminal import show
 
 
-def say(facts: Any, text: Callable[[], str], *, as_json: bool) -> None:
+def print_answer(facts: Any, text: Callable[[], str], *, as_json: bool) -> None:
     """Print an answer.
 
     Parameters

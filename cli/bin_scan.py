@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from reachmap.cli.answers import say
+from reachmap.cli.answers import print_answer
 from reachmap.cli.completing import DEFAULT_CELL
 from reachmap.cli.options import (
     INPUT_FILE,
@@ -105,7 +105,7 @@ def command(
             run=run,
         )
         facts = {"output": str(written_by(output, run))} | summary_of_bin(result)
-    say(facts, lambda: facts_text(facts), as_json=as_json)
+    print_answer(facts, lambda: facts_text(facts), as_json=as_json)
 
 
 def _found_here() -> tuple[Path | None, Path | None]:

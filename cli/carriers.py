@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from reachmap.cli.answers import say
+from reachmap.cli.answers import print_answer
 from reachmap.cli.options import json_option
 
 
@@ -28,7 +28,7 @@ def command(as_json: bool) -> None:
     from reachmap.tools.carriers import list_carriers
 
     rows = list_carriers()
-    say({"carriers": rows}, lambda: "\n".join(_lines(rows)), as_json=as_json)
+    print_answer({"carriers": rows}, lambda: "\n".join(_lines(rows)), as_json=as_json)
 
 
 def _lines(rows: Sequence[dict[str, Any]]) -> Iterator[str]:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from reachmap.cli.answers import say
+from reachmap.cli.answers import print_answer
 from reachmap.cli.completing import complete_cells
 from reachmap.cli.options import (
     json_option,
@@ -53,13 +53,13 @@ def command(
             {"name": row.name, "robot": row.robot, "description": row.description}
             for row in list_cells()
         ]
-        say({"cells": rows}, lambda: "\n".join(_lines(rows)), as_json=as_json)
+        print_answer({"cells": rows}, lambda: "\n".join(_lines(rows)), as_json=as_json)
         return
     if output is None:
         unused("overwrite", because="needs --output")
     text = export_cell(source, output=output, overwrite=overwrite)
     target = None if output is None else str(output)
-    say(
+    print_answer(
         {"output": target, "cell_yaml": text},
         lambda: text if output is None else f"{output}: cell of {source}",
         as_json=as_json,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from reachmap.cli.answers import say
+from reachmap.cli.answers import print_answer
 from reachmap.cli.failures import RunState
 from reachmap.cli.options import cell_argument, json_option, set_option
 
@@ -39,7 +39,7 @@ def command(
     answer = check(cell, overrides)
     state = ctx.find_object(RunState)
     verbose = state is not None and state.verbosity > 0
-    say(
+    print_answer(
         dataclasses.asdict(answer),
         lambda: "\n".join(_lines(answer, verbose=verbose)),
         as_json=as_json,

@@ -7,7 +7,7 @@ from typing import Literal
 
 import click
 
-from reachmap.cli.answers import say
+from reachmap.cli.answers import print_answer
 from reachmap.cli.options import (
     INPUT_FILE,
     OUTPUT_PATH,
@@ -91,7 +91,7 @@ def command(
         draw_many(found, picture, overwrite=overwrite)
     elif picture is not None:
         draw(one, picture, overwrite=overwrite)
-    say(
+    print_answer(
         found.facts() if others else one.facts(),
         lambda: compare_many_text(found) if others else compare_text(one),
         as_json=as_json,

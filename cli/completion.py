@@ -5,7 +5,7 @@ from __future__ import annotations
 import click
 from click.shell_completion import get_completion_class
 
-from reachmap.cli.answers import say
+from reachmap.cli.answers import print_answer
 from reachmap.cli.options import json_option
 
 VARIABLE = "_REACHMAP_COMPLETE"
@@ -36,4 +36,4 @@ def command(ctx: click.Context, shell: str, as_json: bool) -> None:
     if shell == "bash":
         # A key goes on after its dot; bash would put a space there.
         text = text.replace("    return 0\n", f"{GOES_ON}    return 0\n")
-    say({"shell": shell, "script": text}, lambda: text, as_json=as_json)
+    print_answer({"shell": shell, "script": text}, lambda: text, as_json=as_json)

@@ -7,7 +7,7 @@ from typing import Literal
 
 import click
 
-from reachmap.cli.answers import say
+from reachmap.cli.answers import print_answer
 from reachmap.cli.options import (
     INPUT_FILE,
     OUTPUT_PATH,
@@ -96,7 +96,7 @@ def command(
         overwrite=overwrite,
     )
     written = [str(path) for path in (output, picture) if path is not None]
-    say(
+    print_answer(
         answer.facts(),
         lambda: "\n".join([*emptying_lines(answer), *written]),
         as_json=as_json,

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from reachmap.cli import options
-from reachmap.cli.answers import say
+from reachmap.cli.answers import print_answer
 
 FORMATS = ("csv", "json", "joint-trajectory", "moveit", "urscript", "krl", "rapid")
 
@@ -68,4 +68,6 @@ def command(
     )
     facts = {"format": to, "motions": len(exported.motions)}
     facts |= {"text": exported.text} if to_stdout else {"output": str(output)}
-    say(facts, lambda: exported.text if to_stdout else str(output), as_json=as_json)
+    print_answer(
+        facts, lambda: exported.text if to_stdout else str(output), as_json=as_json
+    )

@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from reachmap.cli import options
-from reachmap.cli.answers import say
+from reachmap.cli.answers import print_answer
 
 
 @click.command("heatmap")
@@ -73,4 +73,4 @@ def command(artefact: Path, as_json: bool, **settings: Any) -> None:
     from reachmap.tools.heatmap import heatmap
 
     names = [str(path) for path in heatmap(artefact, **settings)]
-    say({"pictures": names}, lambda: "\n".join(names), as_json=as_json)
+    print_answer({"pictures": names}, lambda: "\n".join(names), as_json=as_json)

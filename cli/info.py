@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from reachmap.cli.answers import say
+from reachmap.cli.answers import print_answer
 from reachmap.cli.options import INPUT_FILE, json_option
 
 
@@ -29,4 +29,4 @@ def command(artefact: Path, as_json: bool) -> None:
     from reachmap.tools.info import info
 
     found = info(artefact)
-    say(found.facts(), lambda: info_text(found), as_json=as_json)
+    print_answer(found.facts(), lambda: info_text(found), as_json=as_json)

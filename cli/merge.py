@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from reachmap.cli.answers import say
+from reachmap.cli.answers import print_answer
 from reachmap.cli.options import (
     INPUT_FILE,
     json_option,
@@ -36,7 +36,7 @@ def command(
 
     outcome = merge(shards, output=output, overwrite=overwrite)
     units = outcome.resumed
-    say(
+    print_answer(
         {"output": str(outcome.path), "shards": len(shards), "units": units},
         lambda: f"{outcome.path}: {units} units of {len(shards)} shards",
         as_json=as_json,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from reachmap.cli.answers import say
+from reachmap.cli.answers import print_answer
 from reachmap.cli.options import json_option, output_option, overwrite_option
 
 if TYPE_CHECKING:
@@ -107,7 +107,7 @@ def command(
     )
     for note in made.notes:
         click.echo(f"note: {note}", err=True)
-    say(
+    print_answer(
         {
             "output": str(made.path),
             "srdf": None if made.srdf_path is None else str(made.srdf_path),

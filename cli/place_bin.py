@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from reachmap.cli.answers import say
+from reachmap.cli.answers import print_answer
 from reachmap.cli.options import (
     INPUT_FILE,
     OUTPUT_PATH,
@@ -176,19 +176,19 @@ def command(
         several = place_bins(
             workspace, output, choice=choice, overrides=overrides, **how
         )
-        _say_several(several, output, top, as_json=as_json)
+        _print_several(several, output, top, as_json=as_json)
         return
     placement = place_bin(
         workspace, output, choice=choice, overrides=with_bin(overrides, bin_name), **how
     )
-    say(
+    print_answer(
         {"output": str(output)} | placement_facts(placement),
         lambda: "\n".join(placement_lines(placement, output, top)),
         as_json=as_json,
     )
 
 
-def _say_several(
+def _print_several(
     placements: Mapping[str, BinPlacement], output: Path, top: int, *, as_json: bool
 ) -> None:
     """Answer with the place of each bin, and the file that it went to."""
@@ -206,4 +206,4 @@ def _say_several(
         for name, placement in placements.items()
         for line in (f"bin {name}", *placement_lines(placement, files[name], top))
     ]
-    say({"bins": facts}, lambda: "\n".join(lines), as_json=as_json)
+    print_answer({"bins": facts}, lambda: "\n".join(lines), as_json=as_json)

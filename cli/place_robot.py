@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from reachmap.cli.answers import say
+from reachmap.cli.answers import print_answer
 from reachmap.cli.options import (
     INPUT_FILE,
     OUTPUT_PATH,
@@ -173,7 +173,7 @@ def command(
         run=run,
     )
     summary = summarise_base(placement)
-    say(
+    print_answer(
         {"output": str(output)} | asdict(summary),
         lambda: "\n".join([*base_lines(summary), str(output)]),
         as_json=as_json,

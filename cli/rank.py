@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from reachmap.cli import options
-from reachmap.cli.answers import say
+from reachmap.cli.answers import print_answer
 from reachmap.cli.list_options import list_options
 
 if TYPE_CHECKING:
@@ -174,7 +174,7 @@ def command(
         chart_top=chart_top,
         overwrite=overwrite,
     )
-    say(
+    print_answer(
         _facts(answer, to_stdout=to_stdout),
         lambda: (
             answer.explanation

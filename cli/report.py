@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from reachmap.cli import options
-from reachmap.cli.answers import say
+from reachmap.cli.answers import print_answer
 
 
 @click.command("report")
@@ -30,4 +30,4 @@ def command(folder: Path, output: Path, overwrite: bool, as_json: bool) -> None:
     from reachmap.tools.report import report
 
     page = str(report(folder, output=output, overwrite=overwrite))
-    say({"output": page}, lambda: page, as_json=as_json)
+    print_answer({"output": page}, lambda: page, as_json=as_json)

@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from reachmap.cli.answers import say
+from reachmap.cli.answers import print_answer
 from reachmap.cli.options import (
     INPUT_FILE,
     OUTPUT_PATH,
@@ -109,7 +109,7 @@ def command(
         run=run,
     )
     summary = summarise_robustness(found)
-    say(
+    print_answer(
         {"output": str(output)} | asdict(summary),
         lambda: "\n".join([*robustness_lines(summary), str(output)]),
         as_json=as_json,

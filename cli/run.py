@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from reachmap.cli import options
-from reachmap.cli.answers import say
+from reachmap.cli.answers import print_answer
 from reachmap.runtime.options import RunOptions
 
 
@@ -55,4 +55,4 @@ def command(
     )
     lines = [f"{path}: kept" for path in found.kept]
     lines += [str(path) for path in (*found.made, found.report)]
-    say(found.facts(), lambda: "\n".join(lines), as_json=as_json)
+    print_answer(found.facts(), lambda: "\n".join(lines), as_json=as_json)

@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from reachmap.cli.answers import say
+from reachmap.cli.answers import print_answer
 from reachmap.cli.options import json_option
 
 
@@ -25,7 +25,7 @@ def command(name: Any, as_json: bool) -> None:
     from reachmap.tools.schema import schema
 
     found = schema(name)
-    say(
+    print_answer(
         found,
         lambda: json.dumps(found, indent=2, ensure_ascii=False),
         as_json=as_json,

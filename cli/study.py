@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from reachmap.cli.answers import say
+from reachmap.cli.answers import print_answer
 from reachmap.cli.options import (
     cell_argument,
     executor_option,
@@ -120,7 +120,7 @@ def command(
 
     result = study(cell, output, run=run, **settings)
     summary = summarise_study(result)
-    say(
+    print_answer(
         {"output": str(output)} | asdict(summary),
         lambda: "\n".join([*study_lines(summary), str(output)]),
         as_json=as_json,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from reachmap.cli import options
-from reachmap.cli.answers import say
+from reachmap.cli.answers import print_answer
 from reachmap.cli.list_options import list_options
 from reachmap.runtime.options import RunOptions
 
@@ -128,4 +128,6 @@ def command(
         calibrate=calibrate,
         run=run,
     )
-    say(answer.facts, lambda: validation_text(answer.validation), as_json=as_json)
+    print_answer(
+        answer.facts, lambda: validation_text(answer.validation), as_json=as_json
+    )

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from reachmap.cli.answers import say
+from reachmap.cli.answers import print_answer
 from reachmap.cli.options import INPUT_FILE, json_option
 
 
@@ -26,7 +26,7 @@ def command(files: tuple[Path, ...], as_json: bool) -> None:
     from reachmap.tools.verify import verify
 
     found = verify(files)
-    say(
+    print_answer(
         found.facts(),
         lambda: "\n".join(verdict.text for verdict in found.whole),
         as_json=as_json,

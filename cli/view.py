@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from reachmap.cli import options
-from reachmap.cli.answers import say
+from reachmap.cli.answers import print_answer
 
 HOST, PORT = "127.0.0.1", 8080
 
@@ -103,10 +103,10 @@ def command(
         test_grasps=test_grasps,
         overwrite=overwrite,
         options=ViewOptions(host=host, port=port, open_browser=open_browser),
-        on_ready=lambda address: say(
+        on_ready=lambda address: print_answer(
             {"address": address}, lambda: f"{address}  (Ctrl-C ends)", as_json=as_json
         ),
     )
     if written is not None:
         page_name = str(written)
-        say({"output": page_name}, lambda: page_name, as_json=as_json)
+        print_answer({"output": page_name}, lambda: page_name, as_json=as_json)

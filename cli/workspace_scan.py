@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from reachmap.cli.answers import say
+from reachmap.cli.answers import print_answer
 from reachmap.cli.options import (
     cell_argument,
     check_scan_options,
@@ -81,4 +81,4 @@ def command(
             run=run,
         )
         facts = {"output": str(written_by(output, run))} | summary_of_workspace(result)
-    say(facts, lambda: facts_text(facts), as_json=as_json)
+    print_answer(facts, lambda: facts_text(facts), as_json=as_json)
