@@ -3,11 +3,12 @@
 ``place-bin`` looks at four corners of its tolerance with a coarse sample; here the
 worst of fifteen poses counts: the pose itself, all eight corners in x, y and yaw, and
 the middle of each side, in height too where nothing supports the bin. All poses are
-asked in the same way, with more points than ``place-bin`` takes for neighbours and
-every orientation. Random poses are feasible as the search means it: clear of all, on a
-support where the cell has one, within the camera's sight. One that scores less than
-the chosen pose's worst case has lost, as has one with such a neighbour; its figure then
-is an upper bound.
+asked in the same way, with more points than ``place-bin`` takes for neighbours, every
+second orientation, and the checks that a map has, of which the search has a quarter:
+what it misses for want of checks is no worse case of the pose. Random poses are
+feasible as the search means it: clear of all, on a support where the cell has one,
+within the camera's sight. One that scores less than the chosen pose's worst case has
+lost, as has one with such a neighbour; its figure then is an upper bound.
 
     python benchmarks/bench_worst_case.py CELL.yaml... [--random N] [--set KEY=VALUE]
 """
@@ -29,7 +30,7 @@ from reachmap.maps import read_workspace_map
 from reachmap.maps.provenance import cell_of_artefact
 from reachmap.placement.decision import paper_pose
 from reachmap.placement.mapped.evaluator import open_evaluator
-from reachmap.placement.mapped.exact import Pose
+from reachmap.placement.mapped.exact import SHARE_OF_CHECKS, Pose
 from reachmap.placement.mapped.sample import Grid
 from reachmap.placement.problem import PlacementProblem
 from reachmap.placement.tolerance import moved_by
@@ -100,6 +101,8 @@ def compare(cell: str, overrides: Sequence[str], count: int, folder: Path) -> No
     x, y, z, yaw = placement.candidate_pose[placement.chosen].tolist()
     chosen: Pose = (x, y, z, yaw)
     progress = Progress("bench", quiet=True)
+    checks = SHARE_OF_CHECKS * loaded.cell.roadmap.max_checks
+    loaded = read_cell(cell, [*overrides, f"roadmap.max_checks={checks}"])
     with open_evaluator(loaded, problem.is_open, QUIET, progress=progress) as evaluator:
         problem = dataclasses.replace(problem, evaluator=evaluator)
         own = worst(chosen, problem)
