@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -121,11 +122,52 @@ def test_json_holds_what_csv_holds(map_path: Path) -> None:
     record = read_bin_map(map_path)
     assert document["map_sha256"] == record.stamp.content_sha256
     assert document["blend_radius_m"] == 0.0
+    assert "blend_rad" not in document["motions"][0]
     table = ways(run(map_path, "--all").stdout)
     for motion in document["motions"]:
         way = table[tuple(map(str, motion["test_grasp"]))]
         np.testing.assert_array_equal(way[:, 1:], motion["configuration"])
         np.testing.assert_array_equal(way[:, 0], motion["time_s"])
+
+
+def test_blended_corners_are_free_when_replayed(tmp_path: Path) -> None:
+    """From the numbers of the JSON and the cell alone; none passes half of a motion."""
+    path = tmp_path / "bin.h5"
+    finger = (
+        '{"name":"finger","attach_to":"link_3","shape":{"box":[0.02,0.02,0.15]},'
+        '"pose":{"xyz":[0.1,0,-0.135]},"touch":["link_2","link_3"]}'
+    )
+    shelf = (
+        '{"name":"shelf","attach_to":"world","shape":{"box":[0.05,0.05,0.1]},'
+        '"pose":{"xyz":[0.24,0.57,-0.15]},"touch":["bin"]}'
+    )
+    overrides = (
+        f"bodies=[{finger},{shelf}]",
+        "bin_scan.grid=[4, 3]",
+        "bin_scan.repeats=1",
+        "planner.time_law=blend",
+    )
+    bin_scan(None, path, cell="planar-toy", overrides=overrides)
+    document = json.loads(run(path, "--all", "--to", "json").stdout)
+    record = read_bin_map(path)
+    scene = Scene.build(cell_of_artefact(record.provenance, str(path)))
+    blended = 0
+    for motion in document["motions"]:
+        q, blend = np.array(motion["configuration"]), np.array(motion["blend_rad"])
+        planned = motion["stage"].count("planned")
+        assert len(blend) == len(q)
+        assert not blend[[0, *range(planned - 1, len(q))]].any()
+        for k in np.flatnonzero(blend):
+            before, after = q[k - 1] - q[k], q[k + 1] - q[k]
+            lengths = np.linalg.norm([before, after], axis=1)
+            assert blend[k] <= lengths.min() / 2 + 1e-12
+            a, c = q[k] + blend[k] * np.array([before, after]) / lengths[:, None]
+            t = np.linspace(0, 1, 50)[:, None]
+            curve = (1 - t) ** 2 * a + 2 * t * (1 - t) * q[k] + t**2 * c
+            for one, other in pairwise(curve):
+                assert dense_free(scene, one, other, margin_m=0.0)
+            blended += 1
+    assert blended > 0
 
 
 def test_one_grasp_and_a_file(map_path: Path, tmp_path: Path) -> None:

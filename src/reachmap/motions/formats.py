@@ -99,6 +99,7 @@ def as_json(motions: Sequence[Motion], origin: Origin) -> str:
                 "stage": list(motion.stage),
                 "time_s": motion.time_s.tolist(),
                 "configuration": motion.configuration.tolist(),
+                **_blends(motion),
             }
             for motion in motions
         ],
@@ -172,6 +173,11 @@ WRITERS: Final[Mapping[str, Writer]] = {
     "rapid": as_rapid,
 }
 """Name of each format to what writes it."""
+
+
+def _blends(motion: Motion) -> dict[str, Any]:
+    given = motion.blend_rad
+    return {} if given is None else {"blend_rad": given.tolist()}
 
 
 def _head(origin: Origin) -> dict[str, Any]:

@@ -35,12 +35,17 @@ class Motion:
     time_s : array, shape (n,)
         When each is reached, within the limits of the joints: at rest at every corner
         of the planned part, without a stop along the straight approach.
+    blend_rad : array, shape (n,), or None
+        How far before and after each way-point, along the joint motion, it may be left
+        and joined again on a parabola that was verified; 0 where it may not. None
+        where the time law of the cell has stops at corners.
     """
 
     test_grasp: tuple[int, int, int, int]
     configuration: FloatArray
     stage: tuple[str, ...]
     time_s: FloatArray
+    blend_rad: FloatArray | None = None
 
     @property
     def pre_grasp(self) -> int:

@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
+import numpy as np
+
+from reachmap.core.planning.time_laws.law import BLENDING_LAWS
 from reachmap.core.robot.model import RobotModel
+from reachmap.core.scene import Scene
 from reachmap.disk import as_path
 from reachmap.errors import SettingsError
 from reachmap.maps import read_bin_map
@@ -15,6 +21,9 @@ from reachmap.maps.provenance import cell_of_artefact
 from reachmap.maps.records import BinMap
 from reachmap.motions.formats import WRITERS, Origin
 from reachmap.motions.motion import Motion, best_rows, motion_of, row_of
+
+if TYPE_CHECKING:
+    from reachmap.cell.loading import LoadedCell
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -75,10 +84,31 @@ def export(
     motions = tuple(
         motion_of(bin_map, row, origin.velocity, origin.acceleration) for row in rows
     )
+    if to == "json":
+        motions = _with_blends(
+            motions, cell_of_artefact(bin_map.provenance, str(map_path))
+        )
     text = WRITERS[to](motions, origin)
     if output is not None:
         publish(output, [text.encode()], overwrite=overwrite)
     return Exported(motions=motions, text=text, written=output)
+
+
+def _with_blends(motions: Sequence[Motion], loaded: LoadedCell) -> tuple[Motion, ...]:
+    """Motions with the blends of their corners, where the cell's time law has any."""
+    if loaded.cell.planner.time_law not in BLENDING_LAWS:
+        return tuple(motions)
+    fillings = loaded.fillings()
+    found = []
+    for motion in motions:
+        layer = motion.test_grasp[0] if len(fillings) > 1 else 0
+        scene = Scene.shared(fillings[layer], with_bin=True)
+        corners = motion.configuration[: motion.pre_grasp + 1]
+        blends = scene.time_law.blends(corners)
+        blend_rad = np.zeros(len(motion.configuration))
+        blend_rad[: len(blends.blend)] = blends.blend
+        found.append(dataclasses.replace(motion, blend_rad=blend_rad))
+    return tuple(found)
 
 
 def _origin(bin_map: BinMap, map_path: Path) -> Origin:

@@ -11,12 +11,18 @@ from reachmap._typing import FloatArray
 from reachmap.cell.model.planner import TimeLawName
 from reachmap.core.planning import timing
 from reachmap.core.planning.time_laws import double_s
-from reachmap.core.planning.time_laws.corners import blended, blended_time_s
+from reachmap.core.planning.time_laws.corners import (
+    BlendedPath,
+    blended,
+    blended_time_s,
+)
 from reachmap.errors import SceneError
 
 if TYPE_CHECKING:
     from reachmap.core.planning.motion import MotionChecker
     from reachmap.core.robot.model import RobotModel
+
+BLENDING_LAWS = ("blend", "toppra")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -56,12 +62,17 @@ class TimeLaw:
             return double_s.polyline_time_s(path, v, a, j)
         if self.name == "trapezoid":
             return timing.execution_time_s(path, v, a)
-        blends = blended(path, self.motions, v, a)
+        blends = self.blends(path)
         if self.name == "blend":
             return blended_time_s(blends, v, a)
         from reachmap.core.planning.time_laws.optimal import optimal_time_s
 
         return optimal_time_s(blends, v, a)
+
+    def blends(self, path: FloatArray) -> BlendedPath:
+        """Blend the corners of a planned path (n, dof) as far as that is verified."""
+        v, a, _ = self._limits()
+        return blended(path, self.motions, v, a)
 
     def way_time_s(self, way: FloatArray) -> float:
         """Time of a straight way of the tool (n, dof), a smooth curve [s]."""
