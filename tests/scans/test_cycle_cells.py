@@ -11,7 +11,7 @@ from reachmap.core.collision.held_part import HeldPart
 from reachmap.maps import Status, read_bin_map
 from reachmap.maps.parts import StageStatus
 from reachmap.runtime.options import RunOptions
-from reachmap.scans.cycle.stages import places_among
+from reachmap.scans.rolls import places_among
 from reachmap.tools.bin_scan import bin_scan
 from reachmap.tools.merge import merge
 from tests.support.cycle_replay import faults_of_cycle, paths_by_stage

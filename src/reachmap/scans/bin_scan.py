@@ -156,9 +156,8 @@ def planning_job(scene: Scene, body_pairs: tuple[str, ...], stages: Stages) -> J
     for k, filling in enumerate(fillings):
         one = stages if len(fillings) == 1 else _OneFilling(stages, f"_fill_{k}")
         way_in = connected_grasps(Scene.shared(filling, with_bin=True), one)
-        way_in, after = whole_cycles(filling, way_in, body_pairs, one)
         known.append(way_in)
-        cycles.append(after)
+        cycles.append(whole_cycles(filling, way_in, body_pairs, one))
     whole = BinContext(
         fillings=fillings,
         known=tuple(known),
@@ -257,9 +256,7 @@ def _results(
         measured=measured,
         own=measured_own,
         component=known.component[[grasp]],
-        winning_roll=np.array(
-            [np.nan if best is None else survey.roll_of(grasp, best.goal)]
-        ),
+        winning_roll=np.array([_roll_of(survey, grasp, best, after)]),
         margins=np.array(
             [[np.nan] * 4 if best is None else margins.of_path(*best[:2])]
         ),
@@ -281,6 +278,15 @@ def _chosen(
     if best.repeat < 0:
         found = [*(way for way in found if way.repeat >= 0), best]
     return found, best
+
+
+def _roll_of(
+    survey: Survey, grasp: int, best: WayIn | None, after: CyclePlan | None
+) -> float:
+    """Roll of the way that a line would run [rad]; NaN without one."""
+    if after is not None and after.way_in is not None:
+        return after.roll_rad  # its goal is one of the cycle's own
+    return float("nan") if best is None else survey.roll_of(grasp, best.goal)
 
 
 def _measured(

@@ -153,17 +153,29 @@ class RollGroups:
             turns = self.turns[begin : begin + step]
             found = solve(self.turned(wanted, turns, axis))
             member, turn = np.divmod(found.frame, len(turns))
-            assert survey.roll is not None
-            survey = _with_goals(
-                survey,
-                self,
-                np.concatenate([survey.frame, wanted[member]]),
-                np.concatenate([survey.roll, turns[turn]]),
-                [*survey.ways(), *found.ways()],
-            )
+            survey = self.with_more(survey, wanted[member], turns[turn], found.ways())
             if until_found:
                 wanted = wanted[~np.isin(wanted, survey.frame)]
         return survey
+
+    def with_more(
+        self, survey: Survey, group: IntArray, roll: FloatArray, ways: list[FloatArray]
+    ) -> Survey:
+        """Add goals, given by group, roll [rad] and approach, behind their group's."""
+        assert survey.roll is not None
+        return _with_goals(
+            survey,
+            self,
+            np.concatenate([survey.frame, group]),
+            np.concatenate([survey.roll, roll]),
+            [*survey.ways(), *ways],
+        )
+
+
+def places_among(frame: IntArray, more: IntArray) -> IntArray:
+    """Where goals are after others were added behind those of their frames."""
+    number = np.arange(len(frame)) - np.searchsorted(frame, frame)
+    return np.asarray(np.searchsorted(more, frame) + number)
 
 
 def _with_goals(

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from reachmap._typing import CodeArray, FloatArray, IntArray
-from reachmap.core.planning.lift import Lifts
+from reachmap.core.planning.lift import Lift, Lifts
 from reachmap.maps.parts import StageStatus, freeze
 from reachmap.maps.records import NO_PAIR
 from reachmap.runtime.job import Job, Stages, blocks
@@ -54,15 +55,37 @@ class LiftSurvey:
     def __post_init__(self) -> None:
         freeze(self)
 
-    def joined_with(self, others: LiftSurvey, place: IntArray) -> LiftSurvey:
-        """The same with other lifts, which take the places (m,) among the goals."""
+    @classmethod
+    def join(cls, parts: Sequence[Mapping[str, Any]], dof: int) -> LiftSurvey:
+        """Put payloads of lifts one after another."""
+        return cls(
+            status=_joined(parts, "status").astype(np.uint8),
+            blocking_pair=_joined(parts, "blocking_pair").astype(np.int64),
+            ways=Ways.join([part["ways"] for part in parts], dof),
+            above_rim=_joined(parts, "above_rim"),
+        )
+
+    @classmethod
+    def blank(cls, goals: int, dof: int) -> LiftSurvey:
+        """No lift from any of some goals."""
+        return cls(
+            status=np.full(goals, StageStatus.NOT_ATTEMPTED, np.uint8),
+            blocking_pair=np.full(goals, NO_PAIR, np.int64),
+            ways=Ways(point=np.zeros((0, dof)), size=np.zeros(goals, np.int64)),
+            above_rim=np.full(goals, np.nan),
+        )
+
+    def with_lifts(self, others: LiftSurvey, rows: IntArray) -> LiftSurvey:
+        """The same with other lifts in place of those in some rows (m,)."""
+        if not len(rows):
+            return self
         status, pair = self.status.copy(), self.blocking_pair.copy()
-        status[place], pair[place] = others.status, others.blocking_pair
+        status[rows], pair[rows] = others.status, others.blocking_pair
         above_rim = self.above_rim.copy()
-        above_rim[place] = others.above_rim
+        above_rim[rows] = others.above_rim
         ways = [self.ways[k] for k in range(len(self.ways))]
-        for k, at in enumerate(place.tolist()):
-            ways[at] = others.ways[k]
+        for k, row in enumerate(rows.tolist()):
+            ways[row] = others.ways[k]
         dof = self.ways.point.shape[1]
         return LiftSurvey(
             status=status,
@@ -108,22 +131,9 @@ def lift_in_stages(
         Job(function=lift_unit, prepare=prepare, context=context),
         [(part.start, part.stop) for part in blocks(len(rows), LIFTS_PER_UNIT)],
     )
-    status = np.zeros(len(survey.frame), np.uint8)
-    pair = np.full(len(survey.frame), NO_PAIR, np.int64)
-    size = np.zeros(len(survey.frame), np.int64)
-    above_rim = np.full(len(survey.frame), np.nan)
-    found = Ways.join([payload["ways"] for payload in payloads], ends.shape[1])
-    if len(rows):
-        status[rows] = np.concatenate([payload["status"] for payload in payloads])
-        pair[rows] = np.concatenate([p["blocking_pair"] for p in payloads])
-        size[rows] = found.size
-        above_rim[rows] = np.concatenate([p["above_rim"] for p in payloads])
-    return LiftSurvey(
-        status=status,
-        blocking_pair=pair,
-        ways=Ways(point=found.point, size=size),
-        above_rim=above_rim,
-    )
+    dof = ends.shape[1]
+    blank = LiftSurvey.blank(len(survey.frame), dof)
+    return blank.with_lifts(LiftSurvey.join(payloads, dof), rows)
 
 
 def prepare(context: LiftContext) -> tuple[LiftContext, Lifts]:
@@ -139,8 +149,14 @@ def lift_unit(
     """Lift the part from one block of configurations."""
     context, lifts = state
     made = [lifts.of(q) for q in context.Q[slice(*block)]]
-    number = {name: k for k, name in enumerate(context.body_pairs)}
-    dof = context.Q.shape[1]
+    return lift_payload(made, context.body_pairs, context.Q.shape[1])
+
+
+def lift_payload(
+    made: Sequence[Lift], body_pairs: Sequence[str], dof: int
+) -> dict[str, Any]:
+    """What a store keeps of some lifts."""
+    number = {name: k for k, name in enumerate(body_pairs)}
     ways = Ways.of([lift.way.reshape(-1, dof) for lift in made], dof)
     return {
         "status": np.array([lift.status for lift in made], np.uint8),
@@ -150,3 +166,7 @@ def lift_unit(
         "ways": dataclasses.asdict(ways),
         "above_rim": np.array([lift.above_rim_m for lift in made]),
     }
+
+
+def _joined(parts: Sequence[Mapping[str, Any]], name: str) -> FloatArray:
+    return np.concatenate([np.zeros(0), *(part[name] for part in parts)])

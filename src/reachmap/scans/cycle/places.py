@@ -25,6 +25,7 @@ from reachmap.scans.measured import attempt_seed
 # many lifts are asked: what is left is within a percent of the best of all.
 _KEPT, _ASKED = 8, 400
 _SEED = 1 << 21
+WaysToPlace = tuple[list[tuple[FloatArray, FloatArray]], str]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -77,6 +78,7 @@ class Places:
 
 def find_places(
     scenes: CycleScenes,
+    placing: Sequence[WaysToPlace],
     body_pairs: Sequence[str],
     lifted: FloatArray,
     progress: Progress,
@@ -86,18 +88,19 @@ def find_places(
     Parameters
     ----------
     scenes : CycleScenes
+    placing : sequence of (list, str)
+        See :func:`ways_to_place`, of each drop-off.
     body_pairs : sequence of str
         As the map numbers them.
     lifted : array, shape (n, dof)
         Ends of the lifts.
     progress : Progress
     """
-    cell, dof = scenes.empty.loaded.cell, scenes.empty.robot.dof
+    dof = scenes.empty.robot.dof
     law = scenes.empty.time_law
     status, pairs = [], []
     found: list[tuple[int, FloatArray, FloatArray]] = []
-    for number, spec in enumerate(cell.drop_offs):
-        ways, pair = ways_to_place(scenes, spec)
+    for number, (ways, pair) in enumerate(placing):
         status.append(
             StageStatus.PATH_FOUND if ways else StageStatus.DROP_OFF_UNREACHABLE
         )
@@ -148,9 +151,7 @@ def _frame(cell: Cell, name: str) -> FloatArray:
     return np.asarray(frames[body.attach_to] @ body.pose.matrix())
 
 
-def ways_to_place(
-    scenes: CycleScenes, spec: DropOffSpec
-) -> tuple[list[tuple[FloatArray, FloatArray]], str]:
+def ways_to_place(scenes: CycleScenes, spec: DropOffSpec) -> WaysToPlace:
     """Straight ways in with the part and out without; or the bodies in the way."""
     scene = scenes.carried
     if spec.pose is None:

@@ -26,8 +26,9 @@ from reachmap.scans.cycle.scenes import (
     stages_of,
 )
 from reachmap.scans.cycle.transfers import Hub, Transfer, Transfers
-from reachmap.scans.ik_survey import TURNS_TRIED
+from reachmap.scans.ik_survey import TURNS_TRIED, Survey
 from reachmap.scans.measured import attempt_seed
+from reachmap.scans.rolls import places_among
 from reachmap.scans.routes import WayIn
 
 if TYPE_CHECKING:
@@ -36,6 +37,7 @@ if TYPE_CHECKING:
 # Branches of the kinematics that are compared to the end; the rest is bounded away.
 _COMPARED = 3
 _SEED = 1 << 20
+NO_ROW = -1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -44,11 +46,14 @@ class CycleKnowledge:
 
     Attributes
     ----------
+    survey : Survey
+        Goals of the cycles: those of the ways in, and others behind them.
     lifts : LiftSurvey
     places : Places
     hubs : tuple of Hub
     """
 
+    survey: Survey
     lifts: LiftSurvey
     places: Places
     hubs: tuple[Hub, ...]
@@ -74,6 +79,8 @@ class CyclePlan:
         Waits included; NaN unless every stage has a path.
     above_rim_m : float
         Of the part at the end of the lift; NaN unless every stage has a path.
+    roll_rad : float
+        Of the tool against the test grasp; NaN unless every stage has a path.
     """
 
     status: CodeArray
@@ -85,6 +92,7 @@ class CyclePlan:
     paths: tuple[tuple[FloatArray, int], ...]
     cycle_time_s: float
     above_rim_m: float = float("nan")
+    roll_rad: float = float("nan")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -118,7 +126,11 @@ class CyclePlanner:
         self, scenes: CycleScenes, known: BinRoadmap, shared: CycleKnowledge
     ) -> None:
         self._scenes, self._known = scenes, known
-        self._survey, self._lifts = known.survey, shared.lifts
+        self._survey, self._lifts = shared.survey, shared.lifts
+        # Goals of the ways in among those of the cycles, and the other way round.
+        self._place = places_among(known.survey.frame, shared.survey.frame)
+        self._row = np.full(len(shared.survey.frame), NO_ROW, np.int64)
+        self._row[self._place] = np.arange(len(self._place))
         self._places = shared.places
         self._transfers = Transfers(scenes, shared.places, shared.hubs)
         self._windings = Windings(scenes.empty.robot)
@@ -154,12 +166,13 @@ class CyclePlanner:
             return self._failure(LIFT, *self._lifts.verdict(goals))
         if self._goes_somewhere and not len(self._places.drop_off):
             return self._without_place(good)
-        best = self._best(grasp, good, found)
+        ways = [way._replace(goal=int(self._place[way.goal])) for way in found]
+        best = self._best(grasp, good, ways)
         if best is None:
             return self._failure(
                 TRANSFER, StageStatus.TRANSFER_NOT_FOUND, NO_PAIR, self._lift_of(good)
             )
-        return self._success(best)
+        return self._success(grasp, best)
 
     def _best(
         self, grasp: int, goals: IntArray, found: Sequence[WayIn]
@@ -243,19 +256,22 @@ class CyclePlanner:
             each=TURNS_TRIED,
         )  # fmt: skip
         goals = way[0] + TURN_RAD * turns
-        network = routes.network
+        network, row = routes.network, int(self._row[goal])
         ways = [] if network is None else network.ways_to(goals, scene.motions, spec)
-        if not ways and np.isfinite(routes.length_rad[goal]):
-            own = routes.paths.path_to(int(routes.node[goal]))
+        seed = attempt_seed(self._cell.seed, _SEED, grasp, goal, 1)
+        if not ways and row == NO_ROW:
+            plan = scene.planner.plan(start, goals, seed)
+            ways = [] if plan.path is None else [plan.path]
+        elif not ways and np.isfinite(routes.length_rad[row]):
+            own = routes.paths.path_to(int(routes.node[row]))
             if np.abs(goals - own[-1]).max(axis=1).min() < 1e-9:
                 ways = [own]
-        seed = attempt_seed(self._cell.seed, _SEED, grasp, goal, 1)
         path = quickest(scene, ways, seed)
         if path is None:
             return None
         return WayIn.of(path, survey.way_from(goal, path[-1]), -1, goal)
 
-    def _success(self, best: _Candidate) -> CyclePlan:
+    def _success(self, grasp: int, best: _Candidate) -> CyclePlan:
         spec, places = self._cell.cycle, self._places
         paths: list[tuple[FloatArray, int]] = [(best.lift, 1)]
         times = [best.lift_s]
@@ -284,6 +300,7 @@ class CyclePlanner:
             paths=tuple(paths),
             cycle_time_s=best.in_s + sum(times) + spec.waits_s + image_s,
             above_rim_m=float(self._lifts.above_rim[best.way_in.goal]),
+            roll_rad=self._survey.roll_of(grasp, best.way_in.goal),
         )
 
     def _lift_of(self, goals: IntArray) -> tuple[float, float]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -12,13 +13,20 @@ from reachmap.cell.model.tool import LISTED
 from reachmap.maps.parts import StageStatus
 from reachmap.runtime.job import Stages
 from reachmap.runtime.progress import Progress
-from reachmap.scans.bin_roadmap import BinRoadmap, MoreRolls, connected_goals
+from reachmap.scans.bin_roadmap import BinRoadmap, MoreRolls
 from reachmap.scans.cycle.lifts import LiftSurvey, lift_in_stages
-from reachmap.scans.cycle.places import Places, find_places
+from reachmap.scans.cycle.places import (
+    Places,
+    WaysToPlace,
+    find_places,
+    ways_to_place,
+)
 from reachmap.scans.cycle.planning import CycleKnowledge
+from reachmap.scans.cycle.quicker_rolls import quicker_goals
 from reachmap.scans.cycle.scenes import CycleScenes
 from reachmap.scans.cycle.transfers import Hub, find_hubs
 from reachmap.scans.ik_survey import Survey
+from reachmap.scans.rolls import places_among
 
 if TYPE_CHECKING:
     from reachmap.cell.loading import LoadedCell
@@ -26,56 +34,86 @@ if TYPE_CHECKING:
 
 def whole_cycles(
     loaded: LoadedCell, known: BinRoadmap, body_pairs: tuple[str, ...], stages: Stages
-) -> tuple[BinRoadmap, CycleKnowledge | None]:
-    """Lift the part from all goals, find where it may go, and connect the two.
+) -> CycleKnowledge | None:
+    """Lift the part from goals, find where it may go, and connect the two.
 
-    Where the roll is free, grasps that have a path and no lift get other rolls.
+    Where the roll is free, grasps get goals at other rolls: at those that promise a
+    quicker cycle, and at more of them until one has a lift. They are the cycle's own:
+    what is known of the ways in stays as it is without a part.
 
     Returns
     -------
-    known : BinRoadmap
-        With the goals of these rolls.
-    shared : CycleKnowledge or None
+    CycleKnowledge or None
         None where the cell has no part.
     """
     scenes = CycleScenes.of(loaded)
     if scenes is None:
-        return known, None
-    survey = known.survey
-    reached = survey.frame[np.isfinite(known.routes.length_rad)]
-    rows = np.flatnonzero(np.isin(survey.frame, reached))
-    lifts = lift_in_stages(loaded, survey, rows, body_pairs, stages, "lift")
-    if loaded.cell.tool.roll != LISTED and not scenes.empty.kinematics.any_roll:
-        survey, lifts = _with_more_rolls(scenes, survey, lifts, body_pairs, stages)
-        if survey is not known.survey:
-            known = connected_goals(scenes.empty, stages, "connect_cycle", survey)
+        return None
+    placing = [ways_to_place(scenes, spec) for spec in loaded.cell.drop_offs]
+    survey, lifts = _lifted(scenes, known, placing, body_pairs, stages)
     goals = np.flatnonzero(lifts.status == StageStatus.PATH_FOUND)
     lifted = lifts.ways.take(goals).last if len(goals) else lifts.ways.point[:0]
-    found = stages.once("return", partial(_places, scenes, body_pairs, lifted))
+    found = stages.once("return", partial(_places, scenes, placing, body_pairs, lifted))
     places = Places.from_payload(found)
 
     def connect(progress: Progress) -> list[dict[str, Any]]:
-        frame = known.survey.frame
+        frame = survey.frame
         hubs = find_hubs(
             scenes, places, goals, frame[goals], lifted, len(frame), progress
         )
         return [hub.payload() for hub in hubs]
 
     hubs = tuple(Hub.from_payload(hub) for hub in stages.once("transfer", connect))
-    return known, CycleKnowledge(lifts=lifts, places=places, hubs=hubs)
+    return CycleKnowledge(survey=survey, lifts=lifts, places=places, hubs=hubs)
+
+
+def _lifted(
+    scenes: CycleScenes,
+    known: BinRoadmap,
+    placing: Sequence[WaysToPlace],
+    body_pairs: tuple[str, ...],
+    stages: Stages,
+) -> tuple[Survey, LiftSurvey]:
+    """Goals of the cycles, those of the ways in among them, and lifts from them."""
+    survey, loaded = known.survey, scenes.empty.loaded
+    reached = np.unique(survey.frame[np.isfinite(known.routes.length_rad)])
+    rolls = None
+    if loaded.cell.tool.roll != LISTED and not scenes.empty.kinematics.any_roll:
+        rolls = MoreRolls(scenes.empty, stages, "_cycle")
+    ways = [way for ways, _ in placing for way in ways]
+    quicker = None
+    if rolls is not None:
+        quicker = quicker_goals(
+            scenes, rolls.groups, survey, reached, ways, body_pairs, stages
+        )
+    if rolls is not None and quicker is not None:
+        approaches = [quicker.approaches[k] for k in range(len(quicker.approaches))]
+        survey = rolls.groups.with_more(survey, quicker.group, quicker.roll, approaches)
+        reached = np.setdiff1d(reached, quicker.group)
+    place = places_among(known.survey.frame, survey.frame)
+    rows = place[np.isin(known.survey.frame, reached)]
+    lifts = lift_in_stages(loaded, survey, rows, body_pairs, stages, "lift")
+    if quicker is not None:
+        added = np.setdiff1d(np.arange(len(survey.frame)), place)
+        lifts = lifts.with_lifts(quicker.lifts, added)
+    if rolls is None:
+        return survey, lifts
+    return _with_more_rolls(scenes, rolls, survey, lifts, body_pairs, stages)
 
 
 def _places(
     scenes: CycleScenes,
+    placing: Sequence[WaysToPlace],
     body_pairs: tuple[str, ...],
     lifted: Any,
     progress: Progress,
 ) -> dict[str, Any]:
-    return find_places(scenes, body_pairs, lifted, progress).payload()
+    return find_places(scenes, placing, body_pairs, lifted, progress).payload()
 
 
 def _with_more_rolls(
     scenes: CycleScenes,
+    rolls: MoreRolls,
     survey: Survey,
     lifts: LiftSurvey,
     body_pairs: tuple[str, ...],
@@ -85,7 +123,6 @@ def _with_more_rolls(
 
     A few rolls at a time, until one has.
     """
-    rolls = MoreRolls(scenes.empty, stages, "_cycle")
     for number, turns in enumerate(rolls.few_at_a_time(), start=1):
         wanted = _without_lift(survey, lifts, is_round=scenes.part.is_round)
         if not len(wanted):
@@ -97,14 +134,8 @@ def _with_more_rolls(
             scenes.empty.loaded, more, rows, body_pairs, stages, f"lift_{number}"
         )
         if len(rows):
-            survey, lifts = more, found.joined_with(lifts, old)
+            survey, lifts = more, found.with_lifts(lifts, old)
     return survey, lifts
-
-
-def places_among(frame: IntArray, more: IntArray) -> IntArray:
-    """Where goals are after others were added behind those of their frames."""
-    number = np.arange(len(frame)) - np.searchsorted(frame, frame)
-    return np.asarray(np.searchsorted(more, frame) + number)
 
 
 def _without_lift(survey: Survey, lifts: LiftSurvey, *, is_round: bool) -> IntArray:
