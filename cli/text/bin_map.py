@@ -7,14 +7,19 @@ from collections.abc import Mapping, Sequence
 from reachmap.cli.text.cycle import cycle_lines
 from reachmap.cli.text.evidence import cause_lines, verdict_text
 from reachmap.cli.text.tables import fact_lines, table_lines
-from reachmap.maps.summary.bin import MEASURES, BinSummary, Spread
+from reachmap.maps.summary.bin import (
+    MEASURES,
+    BinSummary,
+    RefinementSummary,
+    Spread,
+)
 from reachmap.maps.summary.clearance import ClearanceShare
 from reachmap.maps.summary.directions import ReachedShares
 from reachmap.maps.summary.emptying import Emptying
 from reachmap.maps.summary.evidence import EvidenceSummary
 from reachmap.maps.summary.reliability import Reliability
 from reachmap.maps.summary.statistics import Saturation
-from reachmap.text import percent_text, plural
+from reachmap.text import count_text, percent_text, plural
 
 
 def bin_lines(summary: BinSummary) -> list[str]:
@@ -47,6 +52,7 @@ def bin_lines(summary: BinSummary) -> list[str]:
         "Test grasps",
         *cause_lines(summary.causes),
         *_unreached_lines(summary.unreached),
+        *_refinement_lines(summary.refinement),
         "",
         "Attempts that found a path",
         *_measure_lines(summary.measures),
@@ -117,6 +123,25 @@ def _unreached_lines(evidence: EvidenceSummary | None) -> list[str]:
     if evidence is None or not evidence.frames:
         return []
     return ["", "Evidence", *fact_lines([("no path", verdict_text(evidence))])]
+
+
+def _refinement_lines(refinement: RefinementSummary | None) -> list[str]:
+    """What is known between the test grasps, and who asks."""
+    if refinement is None:
+        return []
+    reached = count_text(refinement.reachable, refinement.grasps)
+    asked = "" if refinement.asked is None else f" ({refinement.asked} asked for)"
+    return [
+        "",
+        "Between the test grasps, where the roll is free (bin_scan.refine)",
+        *fact_lines(
+            [
+                ("further grasps", f"{refinement.grasps}{asked}"),
+                ("reachable", reached),
+                ("what for", "rank takes reachable and probability from them"),
+            ]
+        ),
+    ]
 
 
 def reliability_lines(reliability: Mapping[str, Reliability]) -> list[str]:

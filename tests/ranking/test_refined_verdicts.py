@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 from typing import Any
 
 import numpy as np
 import pytest
 
+from reachmap.cli.text.info import info_text
 from reachmap.geometry import (
     inverse_transform,
     quaternion_wxyz_from_rotation,
@@ -19,8 +21,9 @@ from reachmap.maps.records import Status
 from reachmap.ranking import Ranker
 from reachmap.ranking.lookup.approach import complete_rotation
 from reachmap.sampling.volume import GraspVolume
+from reachmap.tools.info import info
 from tests.support.optional import present
-from tests.support.ranking_maps import make_bin_map
+from tests.support.ranking_maps import CELL, make_bin_map
 
 LEVER_M = 0.2
 
@@ -147,6 +150,65 @@ def test_probability_is_the_estimate():
         for m in (coarse, refined(coarse))
     ]
     assert brier[1] < brier[0] / 2
+
+
+def test_info_says_what_was_looked_at_between_the_test_grasps(tmp_path):
+    """How many were asked for, looked at and reached, and what they are for."""
+    cell = {**CELL, "bin_scan": {"refine": 2000}}
+    bin_map = refined(make_bin_map(seed=5), count=50)
+    told = dataclasses.replace(bin_map.provenance, cell_resolved_json=json.dumps(cell))
+    path = tmp_path / "bin.h5"
+    write_bin_map(path, dataclasses.replace(bin_map, provenance=told))
+    reached = int((present(bin_map.refinement).status == Status.PATH_FOUND).sum())
+    facts = info(path)
+    assert facts.facts()["summary"]["refinement"] == {
+        "asked": 2000,
+        "grasps": 50,
+        "reachable": reached,
+    }
+    text = info_text(facts)
+    assert "50 (2000 asked for)" in text
+    assert f"{reached} ({2 * reached:.1f} %)" in text
+    assert "bin_scan.refine" in text
+    write_bin_map(tmp_path / "plain.h5", make_bin_map(seed=5))
+    assert "bin_scan.refine" not in info_text(info(tmp_path / "plain.h5"))
+
+
+def test_a_grasp_without_room_for_the_tool_is_not_reached():
+    """The regression is sure; a tool that is wider than the bin is not asked."""
+    bin_map = refined(make_bin_map(reachable=1.0, seed=6), count=200)
+    every = dataclasses.replace(
+        present(bin_map.refinement),
+        status=np.full(200, Status.PATH_FOUND, np.uint8),
+    )
+    bin_map = dataclasses.replace(bin_map, refinement=every)
+    points, axes = in_base(bin_map, *drawn(bin_map, 2, 40))
+    assert Ranker(bin_map).rank(points, axes).reachable.all()
+    cell = {
+        **CELL,
+        "robot": {"tcp": {"parent": "tool0", "approach_axis": "+z"}},
+        "bin": {
+            "inner": [0.36, 0.26, 0.3],
+            "inner_top": None,
+            "mesh": None,
+            "wall": 0.01,
+        },
+        "collision": {"safety_margin_m": 0.002},
+        "bodies": [
+            {
+                "name": "plate",
+                "attach_to": "tool0",
+                "shape": {"box": [0.4, 0.4, 0.01], "cylinder": None},
+                "pose": {"xyz": [0, 0, -0.1]},
+                "touch": [],
+            }
+        ],
+    }
+    told = dataclasses.replace(bin_map.provenance, cell_resolved_json=json.dumps(cell))
+    ranking = Ranker(dataclasses.replace(bin_map, provenance=told)).rank(points, axes)
+    assert not ranking.reachable.any()
+    assert set(ranking.status) == {Status.IK_IN_COLLISION}
+    assert (ranking.probability < 0.02).all()
 
 
 def test_it_is_kept_in_the_file(tmp_path):

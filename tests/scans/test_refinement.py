@@ -20,6 +20,9 @@ SMALL = (
     "bin_scan.repeats=1",
     "tool.rolls=6",
     "bin_scan.refine=60",
+    # Of a capsule it is not worked out where it has room, so that its collisions with
+    # the walls are to be found.
+    "bodies.camera housing.shape={capsule: {radius: 0.05, length: 0.06}}",
 )
 
 
@@ -57,10 +60,11 @@ def test_verdicts_are_those_of_every_roll(refined):
     """Each grasp has a free goal in one of its rolls exactly where it is reached."""
     scene = scene_of("ur5-eye-in-hand", *SMALL)
     part = refined.refinement
-    assert len(part.status) == 60
-    assert set(part.status.tolist()) >= {Status.PATH_FOUND, Status.IK_IN_COLLISION}
+    # Fewer than asked for: in some rounds nothing is in doubt.
+    assert 30 <= len(part.status) <= 60
+    assert set(part.status.tolist()) >= {Status.PATH_FOUND, Status.APPROACH_BLOCKED}
     R = rotation_from_quaternion_wxyz(part.quaternion_wxyz)
-    for row in range(0, 60, 3):
+    for row in range(0, len(part.status), 3):
         turns = Rotation.from_rotvec(
             np.outer(2 * np.pi * np.arange(6) / 6, R[row][:, 2])
         ).as_matrix()

@@ -2,8 +2,9 @@
 
 A test grasp stands for a box of places and a cone of directions, and a boundary of
 what is reachable runs through many of them. Where the roll is free, further grasps are
-drawn: the first anywhere, the others where a regression over those before is least
-sure. Ranking takes its verdicts from the regression over all of them.
+drawn among those for whose tool the bin has room: the first anywhere, the others where
+a regression over those before is least sure. Ranking takes its verdicts from the
+regression over all of them.
 """
 
 from __future__ import annotations
@@ -20,12 +21,15 @@ from reachmap.cell.model.tool import FREE
 from reachmap.core.scene import Scene
 from reachmap.geometry import (
     axis_rotations,
+    inverse_transform,
     quaternion_wxyz_from_rotation,
     transform_from_parts,
 )
 from reachmap.maps.parts import Refinement
 from reachmap.maps.records import Status
 from reachmap.ranking.lookup.approach import complete_rotation
+from reachmap.ranking.lookup.bin_room import BinRoom
+from reachmap.ranking.lookup.matching import Queries
 from reachmap.runtime.job import Job, Stages, blocks
 from reachmap.sampling.frames import approach_distance_m, bin_test_frames
 from reachmap.sampling.orientations import approach_directions
@@ -84,12 +88,11 @@ def refine(scene: Scene, stages: Stages) -> Refinement | None:
     if scene.robot.dof < FULL_DOF:
         return None
     sizes = _sizes(min(spec.refine, spec.count()))
-    volume = whole_volume(cell)
-    rng = np.random.default_rng([cell.seed, SEED_OF_REFINEMENT])
-    T = _drawn(volume, rng, sizes[0], cell)
+    source = _Source(cell)
+    T = source.draw(CANDIDATES * sizes[0])[: sizes[0]]
     surveys = [_survey(scene, stages, "refine_0", T)]
     for number, count in enumerate(sizes[1:], start=1):
-        batch = _drawn(volume, rng, CANDIDATES * count, cell)
+        batch = source.draw(CANDIDATES * count)
         batch = batch[_in_doubt(T, surveys, batch, cell)[:count]]
         if not len(batch):
             break
@@ -139,16 +142,36 @@ def _in_doubt(
     return order[np.abs(estimate[order] - 0.5) < IN_DOUBT]
 
 
-def _drawn(
-    volume: GraspVolume, rng: np.random.Generator, count: int, cell: Cell
-) -> FloatArray:
-    """Poses of random grasps in robot_base, in the roll fixed by rule, (n, 4, 4)."""
-    T_base_bin = cell.T_base_bin()
-    points, axes = volume.draw(rng, count)
-    R = complete_rotation(
-        axes @ T_base_bin[:3, :3].T, T_base_bin[:3, :3], cell.robot.tcp.approach_axis
-    )
-    return transform_from_parts(R, points @ T_base_bin[:3, :3].T + T_base_bin[:3, 3])
+class _Source:
+    """Draws grasps for whose tool there is room in the bin: others need no asking."""
+
+    def __init__(self, cell: Cell) -> None:
+        self._axis, self._T_base_bin = cell.robot.tcp.approach_axis, cell.T_base_bin()
+        self._volume = whole_volume(cell)
+        self._room = BinRoom.for_tool(
+            cell.model_dump_json(), inverse_transform(self._T_base_bin)
+        )
+        self._rng = np.random.default_rng([cell.seed, SEED_OF_REFINEMENT])
+
+    def draw(self, count: int) -> FloatArray:
+        """Poses in robot_base, in the roll fixed by rule, at most (count, 4, 4)."""
+        T_base_bin = self._T_base_bin
+        points, axes = self._volume.draw(self._rng, count)
+        points = points @ T_base_bin[:3, :3].T + T_base_bin[:3, 3]
+        axes = axes @ T_base_bin[:3, :3].T
+        if self._room is not None:
+            every = np.ones(count, bool)
+            queries = Queries(
+                points=points,
+                axes=axes,
+                quaternions=np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)),
+                free=every,
+                valid=every,
+            )
+            kept = self._room.is_there(queries)
+            points, axes = points[kept], axes[kept]
+        R = complete_rotation(axes, T_base_bin[:3, :3], self._axis)
+        return transform_from_parts(R, points)
 
 
 def _survey(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass
 
 import numpy as np
@@ -105,6 +106,26 @@ class QuadrantSummary:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class RefinementSummary:
+    """What is known between the test grasps, where the roll is free.
+
+    Attributes
+    ----------
+    asked : int or None
+        ``bin_scan.refine`` of the cell; None where the map does not tell.
+    grasps : int
+        Further grasps whose verdict was found: no more than there are test grasps,
+        and fewer where none is in doubt.
+    reachable : int
+        Those with a path in some roll.
+    """
+
+    asked: int | None
+    grasps: int
+    reachable: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class BinSummary:
     """Summary of a bin map.
 
@@ -137,6 +158,8 @@ class BinSummary:
         tell.
     cycle : CycleSummary or None
         What follows the grasps; None where the map does not tell.
+    refinement : RefinementSummary or None
+        None for a map without one.
     """
 
     grasps: int
@@ -156,6 +179,7 @@ class BinSummary:
     emptying: Emptying | None
     clearances: tuple[ClearanceShare, ...]
     cycle: CycleSummary | None
+    refinement: RefinementSummary | None
 
 
 def summarise_bin(record: BinMap) -> BinSummary:
@@ -178,6 +202,19 @@ def summarise_bin(record: BinMap) -> BinSummary:
         emptying=emptying_of(record),
         clearances=clearance_shares(record),
         cycle=summarise_cycle(record),
+        refinement=_refinement(record),
+    )
+
+
+def _refinement(record: BinMap) -> RefinementSummary | None:
+    if record.refinement is None:
+        return None
+    status = record.refinement.status
+    cell = json.loads(record.provenance.cell_resolved_json)
+    return RefinementSummary(
+        asked=cell.get("bin_scan", {}).get("refine"),
+        grasps=len(status),
+        reachable=int((status == Status.PATH_FOUND).sum()),
     )
 
 

@@ -56,10 +56,10 @@ def frames_of(bin_map: BinMap) -> dict[str, FloatArray]:
 
 def _standing_frames(cell: Mapping[str, Any]) -> dict[str, FloatArray]:
     base_pose = cell.get("robot", {}).get("base_pose")
-    T_base_world = inverse_transform(_pose_matrix(base_pose))
+    T_base_world = inverse_transform(pose_matrix(base_pose))
     parents = {"world": T_base_world, "robot_base": np.eye(4)}
     frames = {
-        str(body["name"]): parents[body["attach_to"]] @ _pose_matrix(body["pose"])
+        str(body["name"]): parents[body["attach_to"]] @ pose_matrix(body["pose"])
         for body in cell.get("bodies", [])
         if body["attach_to"] in parents
     }
@@ -130,7 +130,7 @@ def _frame_pose(
     return frames[grasps.frame]
 
 
-def _pose_matrix(pose: Mapping[str, Any] | None) -> FloatArray:
+def pose_matrix(pose: Mapping[str, Any] | None) -> FloatArray:
     """Read a pose of the resolved cell, shape (4, 4)."""
     if not pose:
         return np.eye(4)

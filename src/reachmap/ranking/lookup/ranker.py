@@ -15,6 +15,7 @@ from reachmap.errors import MapFileError, SettingsError
 from reachmap.maps.format.bin import read_bin_map
 from reachmap.maps.parts import StageStatus
 from reachmap.maps.records import BinMap, Stamp
+from reachmap.ranking.lookup.bin_room import BinRoom
 from reachmap.ranking.lookup.calibration import Calibration, usual_calibration
 from reachmap.ranking.lookup.costs import (
     beyond_points,
@@ -39,7 +40,6 @@ from reachmap.ranking.lookup.order import (
     Ranking,
     stable_order,
 )
-from reachmap.ranking.lookup.part_room import PartRoom
 from reachmap.ranking.lookup.queries import (
     queries_from_arrays,
     rotations_from_quaternions,
@@ -103,8 +103,12 @@ class Ranker:
         self.table: GraspTable = table_from_bin_map(bin_map, basis)
         self._around = Surroundings(self.table)
         between = bin_map.refinement
-        self.refined = None if between is None else RefinedVerdicts(between, self.table)
-        self._room = PartRoom.of(bin_map, self.table.T_bin_base)
+        self.refined: RefinedVerdicts | None = None
+        if between is not None:
+            cell = bin_map.provenance.cell_resolved_json
+            tool = BinRoom.for_tool(cell, self.table.T_bin_base)
+            self.refined = RefinedVerdicts(between, self.table, tool)
+        self._room = BinRoom.for_part(bin_map, self.table.T_bin_base)
         self._whole_around, self._held_around = self._cycles_around()
         self.frames: Mapping[str, FloatArray] = frames_of(bin_map)
         self.stamp: Stamp = bin_map.stamp

@@ -1,8 +1,9 @@
 """Verdicts between the test grasps, from the grasps of a map's refinement.
 
 A test grasp represents a box of positions and a cone of directions, through which the
-boundary of what is reachable may run. A refined map has further grasps along that
-boundary; a regression over them decides, and a test grasp near by gives the cost.
+boundary of what is reachable may run. Whether the tool has room in the bin is asked of
+each grasp itself; for all else a refined map has further grasps along that boundary. A
+regression over them decides, and a test grasp near by gives the cost.
 """
 
 from __future__ import annotations
@@ -20,13 +21,16 @@ from reachmap.geometry import (
 )
 from reachmap.maps.parts import Refinement
 from reachmap.maps.records import Status
-from reachmap.ranking.lookup.matching import TIE_M, TIE_RAD, Matches, Queries
-from reachmap.ranking.lookup.table import GraspTable
-from reachmap.sampling.regression import (
-    GraspRegression,
-    squared_distances,
-    tool_points,
+from reachmap.ranking.lookup.bin_room import BinRoom
+from reachmap.ranking.lookup.matching import (
+    TIE_M,
+    TIE_RAD,
+    Matches,
+    NearestPoints,
+    Queries,
 )
+from reachmap.ranking.lookup.table import GraspTable
+from reachmap.sampling.regression import GraspRegression, tool_points
 
 REACHED_FROM: Final = 0.5
 """Estimate from which a grasp counts as reached."""
@@ -44,18 +48,26 @@ class RefinedVerdicts:
     ----------
     refinement : Refinement
     table : GraspTable
+    room : BinRoom, optional
+        For the tool.
     """
 
-    def __init__(self, refinement: Refinement, table: GraspTable) -> None:
+    def __init__(
+        self, refinement: Refinement, table: GraspTable, room: BinRoom | None
+    ) -> None:
         R = rotation_from_quaternion_wxyz(refinement.quaternion_wxyz)
-        self._axes = R @ axis_vector(table.approach_axis)
-        self._refinement, self._table = refinement, table
+        points, axes = refinement.position, R @ axis_vector(table.approach_axis)
+        lever_m = refinement.lever_m
+        self._table, self._room = table, room
         reached = refinement.status == Status.PATH_FOUND
         self._regression = GraspRegression.fit(
-            refinement.position,
-            self._axes,
-            reached.astype(float),
-            refinement.lever_m,
+            points, axes, reached.astype(float), lever_m
+        )
+        self._cause = refinement.status[~reached]
+        self._failed = _NearestGrasps(points[~reached], axes[~reached], lever_m)
+        self._place, self._turn = np.nonzero(table.reachable)
+        self._reachable = _NearestGrasps(
+            table.points[self._place], table.axes[self._place, self._turn], lever_m
         )
 
     def share_reached(self, queries: Queries, around: FloatArray) -> FloatArray:
@@ -69,7 +81,16 @@ class RefinedVerdicts:
         """
         between = self._regression(queries.points, queries.axes)
         estimate = AROUND * around + (1.0 - AROUND) * between
+        estimate[self._without_room(queries, estimate >= REACHED_FROM)] = 0.0
         return np.clip(estimate, _LEAST_SHARE, 1.0 - _LEAST_SHARE)
+
+    def _without_room(self, queries: Queries, rows: BoolArray) -> BoolArray:
+        """Which of some rows have no room for the tool in any roll."""
+        without = np.zeros(len(queries), bool)
+        asked = np.flatnonzero(rows & queries.free)
+        if self._room is not None and len(asked):
+            without[asked] = ~self._room.is_there(queries.take(asked))
+        return without
 
     def decide(
         self, queries: Queries, matches: Matches, share: FloatArray
@@ -107,13 +128,11 @@ class RefinedVerdicts:
     ) -> Matches:
         """Give rows the nearest test grasp that has a path, if there is one."""
         table = self._table
-        place, turn = np.nonzero(table.reachable)
-        if not rows.any() or not len(place):
+        if not rows.any() or not len(self._place):
             return matches
-        part = queries.take(np.flatnonzero(rows))
-        nearest = self._nearest(part, table.points[place], table.axes[place, turn])
+        nearest = self._reachable.to(queries.take(np.flatnonzero(rows)))
         point, orientation = matches.point.copy(), matches.orientation.copy()
-        point[rows], orientation[rows] = place[nearest], turn[nearest]
+        point[rows], orientation[rows] = self._place[nearest], self._turn[nearest]
         offset = queries.points - table.points[point]
         return replace(
             matches,
@@ -129,23 +148,21 @@ class RefinedVerdicts:
 
     def _causes(self, queries: Queries, rows: BoolArray) -> CodeArray:
         status = np.where(rows, np.uint8(Status.NO_PATH_FOUND), np.uint8(0))
-        failed = np.flatnonzero(self._refinement.status != Status.PATH_FOUND)
-        if rows.any() and len(failed):
-            part = queries.take(np.flatnonzero(rows))
-            nearest = self._nearest(
-                part, self._refinement.position[failed], self._axes[failed]
-            )
-            status[rows] = self._refinement.status[failed[nearest]]
+        if rows.any() and len(self._cause):
+            nearest = self._failed.to(queries.take(np.flatnonzero(rows)))
+            status[rows] = self._cause[nearest]
+        status[self._without_room(queries, rows)] = Status.IK_IN_COLLISION
         return status
 
-    def _nearest(
-        self, queries: Queries, points: FloatArray, axes: FloatArray
-    ) -> IntArray:
-        """Index of the grasp with the least tool motion, shape (n,)."""
-        lever_m = self._refinement.lever_m
-        asked = tool_points(queries.points, queries.axes, lever_m)
-        nodes = tool_points(points, axes, lever_m)
-        return np.array(
-            [int(squared_distances(one[None], nodes).argmin()) for one in asked],
-            np.int64,
-        )
+
+class _NearestGrasps:
+    """Grasps to be searched for the one that the tool has to move least to."""
+
+    def __init__(self, points: FloatArray, axes: FloatArray, lever_m: float) -> None:
+        self._lever_m = lever_m
+        self._points = NearestPoints(tool_points(points, axes, lever_m))
+
+    def to(self, queries: Queries) -> IntArray:
+        """Index of the nearest to each, the first of several as near; shape (n,)."""
+        asked = tool_points(queries.points, queries.axes, self._lever_m)
+        return self._points.in_order(asked, 1)[1][:, 0]

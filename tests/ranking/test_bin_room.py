@@ -14,13 +14,15 @@ from scipy.spatial.transform import Rotation
 from reachmap.cell.model.bin_parts import bin_parts
 from reachmap.cell.model.bodies import BinSpec
 from reachmap.core.collision.shapes import coal_shape
+from reachmap.errors import MapFileError
 from reachmap.maps import read_bin_map, write_bin_map
 from reachmap.maps.parts import StageStatus
 from reachmap.ranking import Ranker
+from reachmap.ranking.lookup.bin_room import BinRoom
 from reachmap.ranking.lookup.matching import Queries
 from reachmap.ranking.lookup.order import status_name
-from reachmap.ranking.lookup.part_room import PartRoom
 from tests.support.cycle_maps import with_cycles
+from tests.support.optional import present
 
 MARGIN, ALLOWANCE = 0.002, 0.003
 SIDES = (0.04, 0.03, 0.08)
@@ -54,13 +56,15 @@ def test_room_is_what_an_engine_says(top: Any) -> None:
     """A box off its axis among upright and leaning walls, within and across the rim."""
     rng = np.random.default_rng(4)
     spec = BinSpec(inner=(0.22, 0.16, 0.12), inner_top=top, wall=0.05)
-    room = PartRoom(
-        corners=CORNERS,
+    room = BinRoom(
+        hulls=(CORNERS,),
         T_bin_base=np.eye(4),
         approach_axis="+z",
         inner=np.array(spec.inner),
         top=np.array(spec.top),
-        allowance_m=ALLOWANCE,
+        wall_m=np.inf,
+        lowest_m=-ALLOWANCE,
+        over_rim_m=MARGIN,
         margin_m=MARGIN,
     )
     n = 600
@@ -99,13 +103,15 @@ def distance(R: Any, p: Any, wall: Any) -> float:
 def test_a_free_roll_finds_the_turn_that_fits() -> None:
     """A plate longer than the bin is wide fits along it, and not across it."""
     plate = SIGNS * [0.02, 0.20, 0.03] + [0, 0, 0.015]
-    room = PartRoom(
-        corners=plate,
+    room = BinRoom(
+        hulls=(plate,),
         T_bin_base=np.eye(4),
         approach_axis="+z",
         inner=np.array([0.10, 0.30, 0.10]),
         top=np.array([0.10, 0.30]),
-        allowance_m=0.0,
+        wall_m=np.inf,
+        lowest_m=0.0,
+        over_rim_m=MARGIN,
         margin_m=MARGIN,
     )
     point = np.array([[0.0, 0.0, 0.05]])
@@ -115,6 +121,102 @@ def test_a_free_roll_finds_the_turn_that_fits() -> None:
         assert room.is_there(queries(point, tool, free=False))[0] == fits
         assert room.is_there(queries(point, tool, free=True))[0]
         assert not room.is_there(queries(point - [0, 0, 0.03], tool, free=True))[0]
+
+
+HOUSING, TUBE = (0.08, 0.05, 0.06), {"radius": 0.02, "length": 0.1}
+OTHERS = {"capsule": None, "sphere": None, "mesh": None}
+TOOL_CELL: dict[str, Any] = {
+    "robot": {"tcp": {"parent": "tool0", "xyz": [0, 0, 0.1], "approach_axis": "+z"}},
+    "bin": {"inner": [0.22, 0.16, 0.12], "inner_top": None, "mesh": None, "wall": 0.01},
+    "collision": {"safety_margin_m": MARGIN},
+    "bodies": [
+        {
+            "name": "housing",
+            "attach_to": "tool0",
+            "shape": {"box": HOUSING, "cylinder": None, **OTHERS},
+            "pose": {"xyz": [0.0, -0.07, 0.03], "rpy_deg": [0, 0, 20]},
+            "touch": [],
+        },
+        {
+            "name": "tube",
+            "attach_to": "tool0",
+            "shape": {"box": None, "cylinder": TUBE, **OTHERS},
+            "pose": {"xyz": [0.0, 0.0, 0.05]},
+            "touch": ["bin bottom"],
+        },
+    ],
+}
+
+
+@pytest.mark.parametrize("touches", [True, False])
+def test_the_tool_has_no_room_only_where_it_collides(touches: bool) -> None:
+    """What is refused, coal finds in a wall or the bottom; where it is far, room is."""
+    rng = np.random.default_rng(5)
+    cell = json.loads(json.dumps(TOOL_CELL))
+    if not touches:
+        cell["bodies"][1]["touch"] = []
+    room = present(BinRoom.for_tool(json.dumps(cell), np.eye(4)))
+    spec = BinSpec(inner=(0.22, 0.16, 0.12), wall=0.01)
+    n = 400
+    points = rng.uniform([-0.10, -0.07, 0.02], [0.10, 0.07, 0.14], (n, 3))
+    quaternions = tilted(rng, n, 40.0)
+    said = room.is_there(queries(points, quaternions, free=False))
+    R = Rotation.from_quat(quaternions, scalar_first=True).as_matrix()
+    housing = coal.Box(*HOUSING), [0.0, -0.07, -0.07], 20.0
+    tube = coal.Cylinder(TUBE["radius"], TUBE["length"]), [0.0, 0.0, -0.05], 0.0
+    nearest = np.array(
+        [
+            min(
+                gap(shape, R[k] @ turned_deg(turn), R[k] @ at + points[k], part)
+                for shape, at, turn in ((housing,) if touches else (housing, tube))
+                for part in bin_parts(spec)
+            )
+            for k in range(n)
+        ]
+    )
+    assert 0.2 * n < said.sum() < 0.8 * n
+    # Corners of a sixteen-sided cylinder lie 2 % of its radius inside it.
+    assert (nearest[~said] < MARGIN + 1e-6).all()
+    assert (nearest[said] > -0.001).mean() > 0.9
+
+
+def turned_deg(angle: float) -> Any:
+    """Rotation about z."""
+    return Rotation.from_euler("z", angle, degrees=True).as_matrix()
+
+
+def gap(shape: Any, R: Any, p: Any, part: Any) -> float:
+    """Signed distance of a shape and a part of the bin by coal."""
+    request, result = coal.DistanceRequest(True), coal.DistanceResult()
+    coal.distance(
+        shape,
+        coal.Transform3s(R, p),
+        coal_shape(part.shape),
+        coal.Transform3s(np.eye(3), np.asarray(part.centre_m, float)),
+        request,
+        result,
+    )
+    return float(result.min_distance)
+
+
+def test_a_tool_outside_the_wall_has_room() -> None:
+    """A low bin beside which the housing hangs, on the other side of its wall."""
+    cell = json.loads(json.dumps(TOOL_CELL))
+    cell["bin"]["inner"] = [0.22, 0.16, 0.20]
+    cell["bodies"][0]["pose"]["xyz"] = [0.0, -0.14, 0.03]
+    room = present(BinRoom.for_tool(json.dumps(cell), np.eye(4)))
+    down = Rotation.from_euler("x", 180, degrees=True).as_quat(scalar_first=True)
+    asked = [[0.0, y, 0.02] for y in (0.0, -0.03, 0.05)]
+    said = room.is_there(queries(np.array(asked), np.tile(down, (3, 1)), free=False))
+    # Turned over, the housing hangs towards +y: outside, in the wall, outside.
+    assert said.tolist() == [True, False, True]
+
+
+def test_a_cell_that_does_not_say_where_its_bin_is() -> None:
+    """Nothing is known of room; what is broken is said."""
+    assert BinRoom.for_tool("{}", np.eye(4)) is None
+    with pytest.raises(MapFileError, match="unreadable"):
+        BinRoom.for_tool('{"bin": {}}', np.eye(4))
 
 
 def room_map(width_m: float, *touch: str, depth_m: float = 0.04) -> Any:
