@@ -15,6 +15,7 @@ from reachmap.cli.options import (
     overwrite_option,
     unused,
 )
+from reachmap.cli.quantities import FINITE, FiniteRange
 
 
 @click.command()
@@ -31,7 +32,7 @@ from reachmap.cli.options import (
 )
 @click.option(
     "--tolerance",
-    type=(click.FloatRange(min=0, min_open=True), click.FloatRange(0, 90, True)),
+    type=(FiniteRange(min=0, min_open=True), FiniteRange(0, 90, True)),
     default=(0.1, 0.1),
     show_default=True,
     metavar="MM DEG",
@@ -39,7 +40,7 @@ from reachmap.cli.options import (
 )
 @click.option(
     "--fail-under",
-    type=float,
+    type=FINITE,
     metavar="POINTS",
     help="Exit with 1 if path reachability changes by less than this many percentage "
     "points; -0.5 allows a loss of half a point.",

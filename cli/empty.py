@@ -16,7 +16,7 @@ from reachmap.cli.options import (
     overwrite_option,
     seed_option,
 )
-from reachmap.cli.quantities import PART
+from reachmap.cli.quantities import FINITE, PART
 
 
 @click.command()
@@ -30,7 +30,7 @@ from reachmap.cli.quantities import PART
 )
 @click.option(
     "--fill",
-    type=float,
+    type=FINITE,
     default=0.9,
     show_default=True,
     metavar="SHARE",

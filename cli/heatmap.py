@@ -9,6 +9,7 @@ import click
 
 from reachmap.cli import options
 from reachmap.cli.answers import print_answer
+from reachmap.cli.quantities import FINITE
 
 
 @click.command("heatmap")
@@ -24,7 +25,7 @@ from reachmap.cli.answers import print_answer
 @click.option(
     "--level",
     "levels",
-    type=float,
+    type=FINITE,
     multiple=True,
     metavar="Z",
     help="Draw the level at this height [m] only. Repeatable.",

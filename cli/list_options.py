@@ -8,6 +8,7 @@ from typing import Any
 import click
 
 from reachmap.cli.options import compose, unused
+from reachmap.cli.quantities import FINITE, FiniteRange, GroupsOption
 
 FORMATS = (
     "reachmap",
@@ -66,14 +67,14 @@ list_options = compose(
     click.option(
         "--failure-cost",
         "failure_cost_s",
-        type=click.FloatRange(min=0),
+        type=FiniteRange(min=0),
         metavar="SECONDS",
         help="What a failed pick costs with --cost cycle; default: the median cycle.",
     ),
     click.option(
         "--weights",
         nargs=3,
-        type=float,
+        type=FINITE,
         default=(1.0, 1.0, 1.0),
         show_default=True,
         metavar="α β δ",
@@ -81,7 +82,7 @@ list_options = compose(
     ),
     click.option(
         "--likeness",
-        type=float,
+        type=FINITE,
         default=0.0,
         show_default=True,
         metavar="ε",
@@ -92,8 +93,9 @@ list_options = compose(
         "margins",
         type=(
             click.Choice(["clearance", "joint_margin", "singularity", "wind_up"]),
-            float,
+            FINITE,
         ),
+        cls=GroupsOption,
         multiple=True,
         metavar="NAME μ",
         help="Weight of a margin of the path: clearance, joint_margin, singularity, or "
@@ -132,7 +134,7 @@ list_options = compose(
     ),
     click.option(
         "--max-angle",
-        type=click.FloatRange(0, 180, min_open=True),
+        type=FiniteRange(0, 180, min_open=True),
         metavar="DEG",
         help="Grasps turned further than this from every orientation of the map are "
         "unlike_map; default: 1.5 times the spacing of its orientations.",

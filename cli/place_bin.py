@@ -21,6 +21,7 @@ from reachmap.cli.options import (
     unused,
     with_bin,
 )
+from reachmap.cli.quantities import FINITE, FiniteRange
 from reachmap.runtime.options import RunOptions
 
 if TYPE_CHECKING:
@@ -39,8 +40,8 @@ def parse_fixed(
     for value in values:
         name, equals, number = value.partition("=")
         try:
-            fixed[name.strip()] = float(number)
-        except ValueError:
+            fixed[name.strip()] = FINITE.convert(number, parameter, ctx)
+        except click.BadParameter:
             equals = ""
         if not equals or name.strip() not in AXES:
             raise click.BadParameter(
@@ -62,21 +63,21 @@ region_options = compose(
     click.option(
         "--region",
         nargs=4,
-        type=float,
+        type=FINITE,
         metavar="X0 X1 Y0 Y1",
         help="Keep the bin's centre in this rectangle [m].",
     ),
     click.option(
         "--heights",
         nargs=2,
-        type=float,
+        type=FINITE,
         metavar="Z0 Z1",
         help="Keep the inner bottom between these heights [m].",
     ),
     click.option(
         "--bin-pose",
         nargs=4,
-        type=float,
+        type=FINITE,
         metavar="X Y Z YAW",
         help="Score this pose [m, m, m, deg] instead of searching for one.",
     ),
@@ -107,7 +108,7 @@ region_options = compose(
 @click.option(
     "--tolerance",
     nargs=2,
-    type=click.FloatRange(min=0),
+    type=FiniteRange(min=0),
     metavar="SHIFT TURN",
     help="Optimise the worst case while the bin is off by up to this [m, deg]; 0 0 for "
     "the exact pose. Default: the cell's placement.tolerance.",

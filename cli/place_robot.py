@@ -21,6 +21,7 @@ from reachmap.cli.options import (
     unused,
 )
 from reachmap.cli.place_bin import parse_fixed
+from reachmap.cli.quantities import FINITE
 from reachmap.runtime.options import RunOptions
 
 places_options = compose(
@@ -41,7 +42,7 @@ places_options = compose(
     click.option(
         "--rail-range",
         nargs=2,
-        type=float,
+        type=FINITE,
         metavar="P0 P1",
         help="Keep the joint of --rail between these positions [m].",
     ),
@@ -56,14 +57,14 @@ places_options = compose(
     click.option(
         "--region",
         nargs=4,
-        type=float,
+        type=FINITE,
         metavar="X0 X1 Y0 Y1",
         help="Keep the base in this rectangle of the world [m].",
     ),
     click.option(
         "--heights",
         nargs=2,
-        type=float,
+        type=FINITE,
         metavar="Z0 Z1",
         help="Keep the base between these heights [m]; default: 0.3 m up and down.",
     ),

@@ -1,7 +1,8 @@
-"""Lengths and angles with their units on the command line: ``5mm``, ``1deg``, parts."""
+"""Numbers on the command line, and lengths and angles with their units: ``5mm``."""
 
 from __future__ import annotations
 
+import math
 import re
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,47 @@ BOX_SIDES = re.compile(
 )
 ROUND = re.compile(rf"d({NUMBER})\s*x\s*({NUMBER})\s*(mm|cm|m)", re.IGNORECASE)
 QUANTITY = re.compile(rf"({NUMBER})(mm|cm|m|deg|°|rad)", re.IGNORECASE)
+
+
+class FiniteType(click.types.FloatParamType):
+    """A number that is neither infinite nor NaN, with which no gate would ever fail."""
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> float:
+        """Read one; click reports what is none."""
+        number = float(super().convert(value, param, ctx))
+        if not math.isfinite(number):
+            self.fail(f"{value!r} is not a finite number.", param, ctx)
+        return number
+
+
+class FiniteRange(click.FloatRange):
+    """A finite number in a range; NaN is in any range of click's."""
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> float:
+        """Read one; click reports what is none."""
+        return float(super().convert(FINITE.convert(value, param, ctx), param, ctx))
+
+
+FINITE = FiniteType()
+
+
+class GroupsOption(click.Option):
+    """A repeatable option of several values each, in the environment as well.
+
+    What does not fill its last group there, click leaves out without a word.
+    """
+
+    def value_from_envvar(self, ctx: click.Context) -> Any:
+        """Split into groups; a part of one is a mistake."""
+        text = self.resolve_envvar_value(ctx)
+        if text and len(self.type.split_envvar_value(text)) % self.nargs:
+            message = f"{text!r} is not a list of groups of {self.nargs} values."
+            raise click.BadParameter(message, ctx, self)
+        return super().value_from_envvar(ctx)
 
 
 class ErrorSizeType(click.ParamType):  # type: ignore[type-arg, unused-ignore]
@@ -41,7 +83,7 @@ class ErrorSizeType(click.ParamType):  # type: ignore[type-arg, unused-ignore]
             )
             if kind in sizes:
                 self.fail(f"{value!r}: expected one length and one angle at most.")
-            sizes[kind] = float(found[1]) * float(factors[unit])
+            sizes[kind] = FINITE.convert(found[1], param, ctx) * float(factors[unit])
         if not sizes:
             self.fail("expected a length, an angle or both, as in 5mm 1deg.")
         return sizes.get("shift", 0.0), sizes.get("turn", 0.0)
@@ -66,10 +108,12 @@ class PartType(click.ParamType):  # type: ignore[type-arg, unused-ignore]
             return value
         text = str(value).strip()
         if box := BOX_SIDES.fullmatch(text):
-            x, y, z = (LENGTHS_M[box[4].lower()] * float(box[k]) for k in (1, 2, 3))
+            unit_m = LENGTHS_M[box[4].lower()]
+            x, y, z = (unit_m * FINITE.convert(box[k], param, ctx) for k in (1, 2, 3))
             return x, y, z
         if bar := ROUND.fullmatch(text):
-            d, length = (LENGTHS_M[bar[3].lower()] * float(bar[k]) for k in (1, 2))
+            unit_m = LENGTHS_M[bar[3].lower()]
+            d, length = (unit_m * FINITE.convert(bar[k], param, ctx) for k in (1, 2))
             return d, d, length
         if not Path(text).suffix[1:2].isalpha():
             self.fail(

@@ -10,6 +10,7 @@ import click
 from reachmap.cli import options
 from reachmap.cli.answers import print_answer
 from reachmap.cli.list_options import list_options
+from reachmap.cli.quantities import FINITE
 
 if TYPE_CHECKING:
     from reachmap.ranking.lookup.settings import CostBasis, Invalid, RankSettings
@@ -58,7 +59,7 @@ class ShareType(click.ParamType):  # type: ignore[type-arg, unused-ignore]
 @click.option(
     "--frame-pose",
     nargs=7,
-    type=float,
+    type=FINITE,
     metavar="X Y Z QW QX QY QZ",
     help="Pose of the lists' frame in robot_base, where the cell does not define it: a "
     "camera on the wrist, an object.",
