@@ -22,6 +22,7 @@ from reachmap.cli.verbosity import (
     verbosity_parameters,
 )
 from reachmap.errors import SettingsError
+from reachmap.runtime.signals import stop_signals
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -233,4 +234,6 @@ class PipelineGroup(click.Group):
                 args, prog_name, standalone_mode=False, obj=state, **extra
             )
 
-        sys.exit(exit_code_of(run, state))
+        with stop_signals():  # SIGTERM and a closed terminal end it as Ctrl-C does
+            code = exit_code_of(run, state)
+        sys.exit(code)

@@ -15,6 +15,7 @@ import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor, Future, ProcessPoolExecutor
 from contextlib import contextmanager
+from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection
 from typing import Any, ParamSpec, TypeVar
 
@@ -82,6 +83,10 @@ class WorkerProcess(ProcessPoolExecutor):
     """A pool of one process that is stopped at once, and does not outlive this one."""
 
     def __init__(self) -> None:
+        # Ended by a closed terminal, multiprocessing's own helper would be started
+        # anew, and print a traceback for each thing that it has not heard of.
+        with _blocked(signal.SIGHUP):
+            resource_tracker.ensure_running()
         spawn = multiprocessing.get_context("spawn")
         # The worker holds the reading end of a pipe and leaves when the other end is
         # closed, which also happens when this process is killed.
@@ -94,6 +99,13 @@ class WorkerProcess(ProcessPoolExecutor):
             # with would leave this process writing for ever.
             initargs=(self._reader,),
         )
+
+    def submit(
+        self, fn: Callable[P, R], /, *args: P.args, **kwargs: P.kwargs
+    ) -> Future[R]:
+        """Queue a task; a worker that is started for it hears no Ctrl-C as yet."""
+        with _blocked(signal.SIGINT):
+            return super().submit(fn, *args, **kwargs)
 
     def end(self) -> None:
         """Stop the worker, whatever it is doing."""
@@ -218,9 +230,20 @@ def _workers_import_no_script() -> Iterator[None]:
         namespace.update(hidden)
 
 
+@contextmanager
+def _blocked(number: signal.Signals) -> Iterator[None]:
+    """Block a signal here and in processes started meanwhile."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {number})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
 def _begin(lifeline: Connection) -> None:
     """Begin a worker: leave Ctrl-C to the parent, and do not outlive it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
     threading.Thread(target=_leave_with, args=(lifeline,), daemon=True).start()
 
 
