@@ -44,7 +44,7 @@ from reachmap.plots.parts.levels import QUANTITY_NAMES, Quantity, level_names
 from reachmap.plots.parts.stack import LevelStack, level_title, stack_of
 from reachmap.plots.parts.style import PercentMap
 from reachmap.plots.placement import draw_placement, placement_words
-from reachmap.plots.study import draw_grid, draw_main_effects
+from reachmap.plots.study import draw_best_maps, draw_grid, draw_main_effects
 from reachmap.plots.study_space import draw_interactions, draw_parallel, draw_pareto
 
 # How close a height must be to a level to mean it [m].
@@ -270,8 +270,9 @@ def study_album(
 ) -> list[Picture | Table]:
     """List the pictures of a study.
 
-    Main effects, the grid of two parameters or interactions of more, all variants
-    across their parameters, and what is traded off against the first objective.
+    Main effects, the grid of two parameters or interactions of more, maps of the base
+    and the best, all variants across their parameters, and what is traded off against
+    the first objective.
     """
     items: list[Picture | Table] = []
     is_grid, count = study.design == "grid", len(study.parameter_names)
@@ -287,6 +288,10 @@ def study_album(
             draw = partial(draw_interactions, study, k, percent_map)
             items.append(Picture(name=f"interactions_{name}", title=name, draw=draw))
     first = study.objective_names[0]
+    if study.squares is not None and known.any():
+        draw = partial(draw_best_maps, study, percent_map)
+        title = f"Base and best by {first}"
+        items.append(Picture(name="best_maps", title=title, draw=draw))
     if count > 1 and known.any():
         draw = partial(draw_parallel, study, 0, percent_map)
         title = f"All variants, {first}"

@@ -1,13 +1,27 @@
-"""A study: main effects parameter by parameter, and the grid of two parameters."""
+"""A study: main effects, the grid of two parameters, and the maps of the best."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from reachmap.maps.study.record import OBJECTIVES, Study
-from reachmap.maps.summary.study import UNIT_WORDS, MainEffect, main_effect, value_texts
+from reachmap.maps.study.record import LOWER_IS_BETTER, OBJECTIVES, Study
+from reachmap.maps.summary.study import (
+    UNIT_WORDS,
+    MainEffect,
+    changes_text,
+    main_effect,
+    value_texts,
+)
+from reachmap.plots.parts.squares import (
+    PERCENT_SCALE,
+    cell_edges,
+    colour_bar,
+    draw_squares,
+)
 from reachmap.plots.parts.style import (
     BIN_COLOUR,
     NOT_ATTEMPTED,
@@ -17,6 +31,7 @@ from reachmap.plots.parts.style import (
     drawing,
     ink_on,
     new_figure,
+    put_text,
     put_title,
 )
 
@@ -25,6 +40,8 @@ SQUARE = 0.75
 # More labels than this would run into each other.
 MOST_LABELS = 8
 LABEL = 14
+# Maps side by side: the inches of one, and how many.
+TILE, TILE_HEAD, TILES_ACROSS, TILES_DOWN = 1.9, 0.55, 4, 2
 
 
 @drawing()
@@ -139,6 +156,105 @@ def draw_grid(
     axes.tick_params(length=0)
     put_title(figure, 1.2, f"{name} [{unit}]", "grey: the variant failed")
     return figure
+
+
+@drawing()
+def draw_best_maps(study: Study, percent_map: PercentMap = "RdYlGn") -> Figure:
+    """Maps of the bin side by side: the base, and the best by the first objective.
+
+    Parameters
+    ----------
+    study : Study
+        With ``squares``.
+    percent_map : str
+        Colours of 0 to 100 %.
+    """
+    assert study.squares is not None
+    x, y, maps = (
+        study.squares.bin_x,
+        study.squares.bin_y,
+        study.squares.bin_square,
+    )
+    rows = best_rows(study)
+    span = [float(np.ptp(cell_edges(axis))) for axis in (x, y)]
+    width = min(TILE, TILE * span[0] / span[1])
+    height = width * span[1] / span[0]
+    columns = min(len(rows), TILES_ACROSS)
+    lines = -(-len(rows) // columns)
+    pitch = max(width, TILE) + GAP
+    figure = new_figure(
+        LEFT + columns * pitch + 0.95, 0.3 + lines * (height + TILE_HEAD) + HEAD - 0.3
+    )
+    top = float(figure.get_size_inches()[1]) - HEAD + 0.2
+    for place, row in enumerate(rows):
+        line, column = divmod(place, columns)
+        left, bottom = LEFT + column * pitch, top - (line + 1) * (height + TILE_HEAD)
+        axes = axes_at(figure, left, bottom, width, height)
+        mesh = draw_squares(
+            axes,
+            x,
+            y,
+            maps[row],
+            colours=colour_map(percent_map),
+            scale=PERCENT_SCALE,
+            font_size=min(8.0, 30.0 * width / len(x)) if len(x) <= MOST_LABELS else 0.0,
+        )
+        axes.set_xticks([])
+        axes.set_yticks([])
+        _write_above(
+            figure, left, bottom + height, pitch - 0.1, _tile_words(study, row)
+        )
+    colour_bar(
+        figure,
+        mesh,
+        (LEFT + columns * pitch, top - height - TILE_HEAD, 0.12, height),
+        "reached [%]",
+    )
+    said = "test points of the bin from above, mean over the layers"
+    put_title(figure, LEFT, f"Base and best by {study.objective_names[0]}", said)
+    return figure
+
+
+def _write_above(
+    figure: Figure, left: float, top: float, room: float, words: Sequence[str]
+) -> None:
+    """Write two lines above a map, set smaller where they have no room [in]."""
+    for number, text in enumerate(words):
+        written = put_text(
+            figure,
+            left,
+            top + 0.22 - 0.16 * number,
+            text,
+            fontsize=8.0 - number,
+            fontweight="normal" if number else "bold",
+        )
+        taken = written.get_window_extent().width / figure.dpi
+        if taken > room:
+            written.set_fontsize(float(written.get_fontsize()) * room / taken)
+
+
+def best_rows(study: Study) -> list[int]:
+    """The base, then the best variants by the first objective, as many as are drawn."""
+    name, value = study.objective_names[0], study.objective[:, 0]
+    sign = 1.0 if name in LOWER_IS_BETTER else -1.0
+    known = np.flatnonzero((study.feasible > 0) & ~np.isnan(value))
+    ranked = known[np.argsort(sign * value[known], kind="stable")].tolist()
+    rows = [study.base, *(row for row in ranked if row != study.base)]
+    return [row for row in rows if study.done[row]][: TILES_ACROSS * TILES_DOWN]
+
+
+def _tile_words(study: Study, row: int) -> tuple[str, str]:
+    """What a map is of: its value, and what it changes."""
+    name = study.objective_names[0]
+    unit = UNIT_WORDS[OBJECTIVES[name]]
+    marks = [
+        word
+        for word, marked in (("base", study.base), ("best", study.best))
+        if marked == row
+    ]
+    value = f"{study.objective[row, 0]:.{1 if unit == '%' else 2}f} {unit}"
+    changes = changes_text(study, row) or study.assignment[row]
+    return " · ".join([*marks, value]), changes
 
 
 def _axis_title(effect: MainEffect) -> str:

@@ -12,7 +12,12 @@ from reachmap._typing import BoolArray, FloatArray
 from reachmap.maps.comparison.significance import benjamini_hochberg
 from reachmap.maps.records import RunInfo, Stamp, Status
 from reachmap.maps.study.format import write_study
-from reachmap.maps.study.record import LOWER_IS_BETTER, Study, VariantStatus
+from reachmap.maps.study.record import (
+    LOWER_IS_BETTER,
+    BinSquares,
+    Study,
+    VariantStatus,
+)
 from reachmap.runtime.job import Job, Kind, Stages, Work
 from reachmap.scans.document import journal_settings, provenance_from_document
 from reachmap.studies.outcomes import (
@@ -96,6 +101,7 @@ def assemble(
         objective_low=values["low"],
         objective_high=values["high"],
         **changes,
+        squares=squares_of([row.get("bin_reachability") for row in outcomes]),
         stamp=Stamp(**document["stamp"]),
         provenance=provenance_from_document(document),
         run=run,
@@ -130,6 +136,24 @@ def _status(found: Sequence[Mapping[str, Any]], done: BoolArray) -> Any:
     left = np.array([payload.get("left_out", False) for payload in found])
     status = np.where(left, VariantStatus.LEFT_OUT, status)
     return np.where(done & ~failed, VariantStatus.DONE, status).astype(np.uint8)
+
+
+def squares_of(outcomes: Sequence[Outcomes | None]) -> BinSquares | None:
+    """What is reached at each point; None where variants have other points."""
+    tables = [None if found is None else found.by_point() for found in outcomes]
+    first = next((table for table in tables if table is not None), None)
+    if first is None or not all(
+        np.array_equal(table[0], first[0]) and np.array_equal(table[1], first[1])
+        for table in tables
+        if table is not None
+    ):
+        return None
+    nothing = np.full_like(first[2], np.nan)
+    return BinSquares(
+        bin_x=first[0],
+        bin_y=first[1],
+        bin_square=np.array([nothing if t is None else t[2] for t in tables]),
+    )
 
 
 def _values(

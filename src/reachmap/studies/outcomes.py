@@ -61,6 +61,27 @@ class Outcomes:
     result: FloatArray
     place_columns: int = 3
 
+    def by_point(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Points seen from above, and the share of outcomes that are 1 at each.
+
+        Returns
+        -------
+        x, y : array, shape (nx,), (ny,)
+            Rising [m].
+        percent : array, shape (ny, nx)
+            NaN where there is no outcome.
+        """
+        (x, column), (y, row) = (
+            np.unique(np.round(self.key[:, k] * TOLERANCE_M, 9), return_inverse=True)
+            for k in range(2)
+        )
+        hits, count = np.zeros((2, len(y), len(x)))
+        np.add.at(hits, (row, column), self.result)
+        np.add.at(count, (row, column), 1.0)
+        percent = np.full(count.shape, np.nan)
+        np.divide(100.0 * hits, count, out=percent, where=count > 0)
+        return x, y, percent
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Change:

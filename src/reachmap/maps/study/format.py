@@ -9,11 +9,29 @@ import numpy as np
 
 from reachmap.maps.bytes.tree import Tree
 from reachmap.maps.comparison.significance import benjamini_hochberg
-from reachmap.maps.format.assembly import assemble, origin_of
+from reachmap.maps.format.assembly import (
+    assemble,
+    origin_of,
+    section_arrays,
+    sections_of,
+)
 from reachmap.maps.format.checks import require
-from reachmap.maps.format.layout import Layout, Variable, index
+from reachmap.maps.format.layout import (
+    PERCENT,
+    Layout,
+    Section,
+    Variable,
+    coordinate,
+    index,
+)
 from reachmap.maps.format.store import RecordFile
-from reachmap.maps.study.record import MEANS, STATES, Study, VariantStatus
+from reachmap.maps.study.record import (
+    MEANS,
+    STATES,
+    BinSquares,
+    Study,
+    VariantStatus,
+)
 
 TEXTS: Final = {
     "assignment": "What the variant sets.",
@@ -124,6 +142,22 @@ def _of_objective(path: str, dtype: str, meaning: str, **more: Any) -> Variable:
     )
 
 
+SQUARES = Section(
+    field="squares",
+    part=BinSquares,
+    arrays={
+        "bin_x": coordinate("bin_x", "Columns of test points.", "bin"),
+        "bin_y": coordinate("bin_y", "Rows of test points.", "bin"),
+        "bin_square": Variable(
+            path="bin_square",
+            dims=("variant", "bin_y", "bin_x"),
+            dtype="f8",
+            meaning="Share of the test grasps at a point that are reached; NaN: none.",
+            nan=True,
+            **PERCENT,
+        ),
+    },
+)
 STUDY = Layout(
     kind="study",
     title="Variants of a robot cell compared",
@@ -158,6 +192,7 @@ STUDY = Layout(
             is_flag=True,
         ),
     ),
+    sections=(SQUARES,),
 )
 _ARRAYS: Final = ("parameter", "status", "feasible", "significant", *NUMBERS, *COUNTS)
 _PLAIN: Final = ("design", "bin_mode", "base", "best", "runner_up")
@@ -169,7 +204,7 @@ def tree_from_study(record: Study) -> Tree:
     arrays.update({name: np.array(getattr(record, name), str) for name in TEXTS})
     return assemble(
         STUDY,
-        arrays=arrays,
+        arrays=arrays | section_arrays(STUDY, record)[0],
         attributes={name: getattr(record, name) for name in _PLAIN},
         labels={"states": STATES} | {name: getattr(record, name) for name in LISTS},
         stamp=record.stamp,
@@ -186,6 +221,7 @@ def study_from_tree(tree: Tree, path: Path) -> Study:
     fields.update({name: tree.attributes[name] for name in _PLAIN})
     return Study(
         **fields,
+        **sections_of(STUDY, tree),
         **origin_of(tree, path),
     )
 

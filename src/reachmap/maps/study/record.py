@@ -50,6 +50,27 @@ class VariantStatus(IntEnum):
 STATES = tuple(state.name.lower() for state in VariantStatus)
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class BinSquares:
+    """What is reached of the bin in each variant, point by point.
+
+    Attributes
+    ----------
+    bin_x, bin_y : array, shape (nx,), (ny,)
+        Test points, in the bin frame [m].
+    bin_square : array, shape (nv, ny, nx)
+        Share of the test grasps at each point that are reached, mean over the layers
+        [percent]; NaN where there is none.
+    """
+
+    bin_x: FloatArray
+    bin_y: FloatArray
+    bin_square: FloatArray
+
+    def __post_init__(self) -> None:
+        freeze(self)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Study:
     """Variants of a cell. Index order (variant, parameter or objective).
@@ -93,6 +114,8 @@ class Study:
     significant : uint8 array, shape (nv, no)
         1 where the change is more than chance, at a false-discovery rate of 5 %
         across the study.
+    squares : BinSquares, optional
+        Where all variants have the same test points.
     """
 
     design: str
@@ -127,6 +150,7 @@ class Study:
     stamp: Stamp
     provenance: Provenance
     run: RunInfo
+    squares: BinSquares | None = None
 
     def __post_init__(self) -> None:
         freeze(self)
