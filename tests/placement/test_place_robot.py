@@ -246,6 +246,10 @@ def test_arms_are_compared_in_one_call(tmp_path):
         (RobotChoice(rail="joint_1"), "--rail 'joint_1'.*prismatic"),
         (RobotChoice(moves=("table",)), "'table' is not a body on the world"),
         (RobotChoice(fixed={"roll": 1.0}), "--fix roll"),
+        (RobotChoice(limits={"x": (1.0, 0.0)}), "x from 1 to 0: .*smaller one first"),
+        (RobotChoice(limits={"z": (np.nan, 0.0)}), "z from nan to 0: expected two num"),
+        (RobotChoice(limits={"z": (0.0, np.inf)}), "z from 0 to inf: expected two num"),
+        (RobotChoice(fixed={"yaw": np.nan}), "--fix yaw=nan: expected a number"),
         (RobotChoice(rail="x", mountings=("floor",)), "--rail: the base stays"),
     ],
 )

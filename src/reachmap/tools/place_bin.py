@@ -58,7 +58,7 @@ from reachmap.scans.document import (
     provenance_from_document,
     scan_document,
 )
-from reachmap.tools.options import with_seed
+from reachmap.tools.options import check_places, with_seed
 from reachmap.tools.placement_picture import draw_placed
 from reachmap.tools.prologue import refuse_cell_files
 
@@ -291,6 +291,8 @@ def check_choice(choice: PlacementChoice) -> None:
     unknown = sorted(set(choice.fixed) - set(AXES))
     if unknown:
         raise SettingsError(f"--fix {unknown[0]}: expected one of {', '.join(AXES)}")
+
+    check_places(choice.limits, choice.fixed)
 
 
 def _region(

@@ -47,7 +47,7 @@ from reachmap.placement.mapped.sample import open_frames
 from reachmap.placement.predicted.region import AXES, Region
 from reachmap.runtime.options import IN_PROCESS, RunOptions
 from reachmap.runtime.progress import Progress
-from reachmap.tools.options import with_seed
+from reachmap.tools.options import check_places, with_seed
 from reachmap.tools.prologue import path_of_cell, refuse_cell_files
 
 
@@ -154,6 +154,7 @@ def _check(choice: RobotChoice) -> None:
     unknown = sorted(set(choice.fixed) - set(AXES))
     if unknown:
         raise SettingsError(f"--fix {unknown[0]}: expected one of {', '.join(AXES)}")
+    check_places(choice.limits, choice.fixed)
     for name in choice.mountings:
         try:
             fits = name in LEANS_DEG or 0.0 <= float(name) <= 180.0
