@@ -399,7 +399,7 @@ def test_the_bin_keeps_out_of_the_robots_own_table(tmp_path: Path) -> None:
     path = urdf(tmp_path / "arm.urdf", arm(base=table))
     output = tmp_path / "cell.yaml"
     made = new_cell(path, output=output)
-    assert "in front of the base it would meet base_link" in made.stderr
+    assert "in front of the base it would collide with base_link" in made.stderr
     checked(output)
 
 

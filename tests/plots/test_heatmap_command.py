@@ -207,7 +207,7 @@ def test_placement_without_a_map_is_drawn_by_itself(folder: Path) -> None:
         (["bin.h5", "--level", "0"], "--quantity and --level are for workspace"),
         (["workspace.h5", "--workspace", "workspace.h5"], "--workspace is for"),
         (["-o", "notes.txt"], "notes.txt: "),
-        (["--level", "nan"], "no level at z = nan m"),
+        (["--level", "nan"], "'nan' is not a finite number"),
         (["--cmap", "jet"], "'jet' is not one of"),
     ],
 )

@@ -95,7 +95,7 @@ def test_too_few_grasps_are_refused_before_planning(folder, monkeypatch):
     monkeypatch.setattr("reachmap.tools.validate.plan_picks_over_routes", None)
     result = run("validate", "bin.h5", "--random", 49, "--calibrate", "-j", 1)
     assert result.exit_code == 2
-    assert "needs 50 grasps or more that the map speaks about (got 49)" in result.stderr
+    assert "needs 50 grasps or more within the map (got 49)" in result.stderr
 
 
 def test_a_map_with_levels_of_filling_is_calibrated(tmp_path, monkeypatch):
