@@ -7,7 +7,6 @@ from pathlib import Path
 
 import click
 
-from reachmap.cli.answers import print_answer
 from reachmap.cli.completing import DEFAULT_CELL
 from reachmap.cli.options import (
     INPUT_FILE,
@@ -19,6 +18,7 @@ from reachmap.cli.options import (
     unused,
     with_bin,
 )
+from reachmap.cli.terminal import print_answer
 from reachmap.cli.text.tables import facts_text
 from reachmap.runtime.options import RunOptions
 

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import click
 
-from reachmap.cli.answers import print_answer
 from reachmap.cli.completing import complete_cells
 from reachmap.cli.options import (
     json_option,
@@ -15,6 +14,7 @@ from reachmap.cli.options import (
     overwrite_option,
     unused,
 )
+from reachmap.cli.terminal import print_answer
 
 
 @click.command()

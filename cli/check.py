@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 import click
 
-from reachmap.cli.answers import print_answer
 from reachmap.cli.failures import RunState
 from reachmap.cli.options import cell_argument, json_option, set_option
+from reachmap.cli.terminal import print_answer
 
 if TYPE_CHECKING:
     from reachmap.tools.check import CellCheck

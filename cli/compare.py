@@ -7,7 +7,6 @@ from typing import Literal
 
 import click
 
-from reachmap.cli.answers import print_answer
 from reachmap.cli.options import (
     INPUT_FILE,
     OUTPUT_PATH,
@@ -16,6 +15,7 @@ from reachmap.cli.options import (
     unused,
 )
 from reachmap.cli.quantities import FINITE, FiniteRange
+from reachmap.cli.terminal import print_answer
 
 
 @click.command()

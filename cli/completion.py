@@ -5,8 +5,8 @@ from __future__ import annotations
 import click
 from click.shell_completion import get_completion_class
 
-from reachmap.cli.answers import print_answer
 from reachmap.cli.options import json_option
+from reachmap.cli.terminal import print_answer
 
 VARIABLE = "_REACHMAP_COMPLETE"
 GOES_ON = "    [[ ${COMPREPLY[0]} == *[.=] ]] && compopt -o nospace\n"

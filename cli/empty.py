@@ -7,7 +7,6 @@ from typing import Literal
 
 import click
 
-from reachmap.cli.answers import print_answer
 from reachmap.cli.options import (
     INPUT_FILE,
     OUTPUT_PATH,
@@ -17,6 +16,7 @@ from reachmap.cli.options import (
     seed_option,
 )
 from reachmap.cli.quantities import FINITE, PART
+from reachmap.cli.terminal import print_answer
 
 
 @click.command()

@@ -8,8 +8,8 @@ from typing import Any
 import click
 
 from reachmap.cli import options
-from reachmap.cli.answers import print_answer
 from reachmap.cli.quantities import FINITE
+from reachmap.cli.terminal import print_answer
 
 
 @click.command("heatmap")

@@ -6,13 +6,13 @@ from pathlib import Path
 
 import click
 
-from reachmap.cli.answers import print_answer
 from reachmap.cli.options import (
     INPUT_FILE,
     json_option,
     output_option,
     overwrite_option,
 )
+from reachmap.cli.terminal import print_answer
 
 
 @click.command()

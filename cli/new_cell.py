@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from reachmap.cli.answers import print_answer
 from reachmap.cli.options import json_option, output_option, overwrite_option
+from reachmap.cli.terminal import print_answer
 
 if TYPE_CHECKING:
     from reachmap.tools.new_cell import NewCell

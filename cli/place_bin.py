@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from reachmap.cli.answers import print_answer
 from reachmap.cli.options import (
     INPUT_FILE,
     OUTPUT_PATH,
@@ -22,6 +21,7 @@ from reachmap.cli.options import (
     with_bin,
 )
 from reachmap.cli.quantities import FINITE, FiniteRange
+from reachmap.cli.terminal import print_answer
 from reachmap.runtime.options import RunOptions
 
 if TYPE_CHECKING:

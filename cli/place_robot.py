@@ -7,7 +7,6 @@ from pathlib import Path
 
 import click
 
-from reachmap.cli.answers import print_answer
 from reachmap.cli.options import (
     INPUT_FILE,
     OUTPUT_PATH,
@@ -22,6 +21,7 @@ from reachmap.cli.options import (
 )
 from reachmap.cli.place_bin import parse_fixed
 from reachmap.cli.quantities import FINITE
+from reachmap.cli.terminal import print_answer
 from reachmap.runtime.options import RunOptions
 
 places_options = compose(

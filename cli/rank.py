@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from reachmap.cli import options
-from reachmap.cli.answers import print_answer
 from reachmap.cli.list_options import list_options
 from reachmap.cli.quantities import FINITE
+from reachmap.cli.terminal import print_answer
 
 if TYPE_CHECKING:
     from reachmap.ranking.lookup.settings import CostBasis, Invalid, RankSettings

@@ -8,7 +8,6 @@ from typing import Any
 
 import click
 
-from reachmap.cli.answers import print_answer
 from reachmap.cli.options import (
     INPUT_FILE,
     OUTPUT_PATH,
@@ -18,6 +17,7 @@ from reachmap.cli.options import (
     seed_option,
 )
 from reachmap.cli.quantities import ERROR_SIZE, QuantityCommand
+from reachmap.cli.terminal import print_answer
 from reachmap.runtime.options import RunOptions
 
 NONE = (0.0, 0.0)

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from reachmap.cli import options
-from reachmap.cli.answers import print_answer
+from reachmap.cli.terminal import print_answer
 from reachmap.runtime.options import RunOptions
 
 

@@ -7,8 +7,8 @@ from typing import Any
 
 import click
 
-from reachmap.cli.answers import print_answer
 from reachmap.cli.options import json_option
+from reachmap.cli.terminal import print_answer
 
 
 @click.command()

@@ -8,7 +8,6 @@ from typing import Any
 
 import click
 
-from reachmap.cli.answers import print_answer
 from reachmap.cli.options import (
     cell_argument,
     executor_option,
@@ -22,6 +21,7 @@ from reachmap.cli.options import (
     set_option,
     workers_option,
 )
+from reachmap.cli.terminal import print_answer
 from reachmap.runtime.options import RunOptions
 
 OBJECTIVES = (

@@ -1,16 +1,19 @@
-"""Styling of answers on a terminal: headings, verdicts, links.
+"""Answers on stdout: text for people, or one JSON value for programs.
 
-The characters stay the same. In pipes and files, on a dumb terminal, and where rich is
-not installed, the text is plain; NO_COLOR removes the colours.
+On a terminal, text has headings, coloured verdicts and links, with the same characters.
+In pipes and files, on a dumb terminal, and where rich is not installed, it is plain;
+NO_COLOR removes the colours.
 """
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import sys
+from collections.abc import Callable
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import click
 
@@ -25,8 +28,27 @@ BAD: Final = re.compile(
 PLACE: Final = re.compile(r"https?://\S+|[^\s:,;'\"]*[/.][^\s:,;'\"]*")
 
 
-def show(text: str) -> None:
-    """Print an answer on stdout, styled where a terminal reads it."""
+def print_answer(facts: Any, text: Callable[[], str], *, as_json: bool) -> None:
+    """Print an answer.
+
+    Parameters
+    ----------
+    facts : value
+        What ``--json`` prints as one line; what is not finite becomes null.
+    text : callable
+        Makes what people read instead; nothing is printed where it is empty.
+    as_json : bool
+    """
+    if as_json:
+        # Imported here: text needs no NumPy.
+        from reachmap.maps.bytes.to_json import json_ready
+
+        click.echo(json.dumps(json_ready(facts), allow_nan=False))
+    elif said := text():
+        _show(said.rstrip("\n"))
+
+
+def _show(text: str) -> None:
     if not (is_terminal(sys.stdout) and _show_styled(text)):
         click.echo(text)
 

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import click
 
 from reachmap.cli import options
-from reachmap.cli.answers import print_answer
 from reachmap.cli.list_options import list_options
+from reachmap.cli.terminal import print_answer
 from reachmap.runtime.options import RunOptions
 
 if TYPE_CHECKING:

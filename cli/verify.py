@@ -6,8 +6,8 @@ from pathlib import Path
 
 import click
 
-from reachmap.cli.answers import print_answer
 from reachmap.cli.options import INPUT_FILE, json_option
+from reachmap.cli.terminal import print_answer
 
 
 @click.command()

@@ -6,13 +6,13 @@ from pathlib import Path
 
 import click
 
-from reachmap.cli.answers import print_answer
 from reachmap.cli.options import (
     cell_argument,
     check_scan_options,
     output_option,
     scan_options,
 )
+from reachmap.cli.terminal import print_answer
 from reachmap.cli.text.tables import facts_text
 from reachmap.runtime.options import RunOptions
 

@@ -14,13 +14,15 @@ from reachmap.maps import read_bin_map
 from reachmap.maps.bytes.publish import check_outputs, check_picture
 from reachmap.maps.records import BinMap
 from reachmap.ranking.answers.explain import explanation, find_grasp
-from reachmap.ranking.answers.files import joined, targets_of, write_lists
 from reachmap.ranking.answers.pipeline import pose_from_numbers, rank_list
 from reachmap.ranking.answers.ranked_list import (
     RankedList,
     cost_groups,
     document_text,
+    joined,
     ranked_document,
+    targets_of,
+    write_lists,
 )
 from reachmap.ranking.lists.arrays import GraspList
 from reachmap.ranking.lists.reading import STDIN, read_grasps
