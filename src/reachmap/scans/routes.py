@@ -18,10 +18,10 @@ from reachmap.core.planning.roadmap import ShortestPaths
 from reachmap.core.planning.routes import (
     RouteNetwork,
     build_network,
-    shorten_until,
     spread_over,
 )
-from reachmap.core.planning.timing import path_length_rad
+from reachmap.core.planning.shortcut import settle
+from reachmap.core.planning.timing import Pace
 from reachmap.core.scene import Scene
 from reachmap.scans.ik_survey import Survey
 from reachmap.scans.measured import attempt_seed
@@ -109,6 +109,7 @@ class Routes:
             ],
             [Planner(scene.motions, one) for one in portfolio(spec)],
             spec,
+            pace_of(scene),
             cell.seed,
         )
         return cls(paths=paths, node=node, network=network)
@@ -129,7 +130,9 @@ class Routes:
         return cls(
             paths=ShortestPaths(**payload["paths"]),
             node=payload["node"],
-            network=None if network is None else RouteNetwork(**network),
+            network=None
+            if network is None
+            else RouteNetwork(**{**network, "pace": Pace(**network["pace"])}),
         )
 
     @property
@@ -150,6 +153,14 @@ class Routes:
         return self.paths.path_to(int(self.node[goal])), goal
 
 
+def pace_of(scene: Scene) -> Pace:
+    """What the paths of a scene are compared by."""
+    return Pace(
+        velocity=scene.robot.velocity_rad_s,
+        acceleration=scene.robot.acceleration_rad_s2,
+    )
+
+
 class RouteAttempts:
     """Makes attempts at test grasps over the network.
 
@@ -162,13 +173,13 @@ class RouteAttempts:
 
     def __init__(self, scene: Scene, survey: Survey, routes: Routes) -> None:
         self._scene, self._survey, self._routes = scene, survey, routes
-        self._windings = Windings(scene.robot)
+        self._windings, self._pace = Windings(scene.robot), pace_of(scene)
 
     def at(self, grasp: int, repeats: int) -> list[tuple[PlanResult, int]]:
         """Attempts at one test grasp, each with the goal it ends at.
 
         The ways that branch off the network are the same for all of them; each
-        shortens them with a seed of its own. Empty where the grasp is not connected.
+        settles them with a seed of its own. Empty where the grasp is not connected.
         """
         own = self._routes.over_roadmap(self._survey, grasp)
         if own is None:
@@ -187,16 +198,16 @@ class RouteAttempts:
         for repeat in range(repeats):
             begin = time.thread_time()
             path, end = own
-            # What is straight needs no shortening: every attempt takes it.
+            # What is straight needs no settling: every attempt takes it.
             if repeat and ways and len(ways[0]) == 2:
                 path, end = ways[0], attempts[0][1]
             else:
-                path = self._shortened(ways or [path], grasp, repeat)
+                path = self._settled(ways or [path], grasp, repeat)
                 if ways:
                     end = int(goal[np.argmin(np.abs(goals - path[-1]).max(axis=1))])
             result = dataclasses.replace(
                 PlanResult.without_search(path, end),
-                checks=checks,
+                checks=checks if len(path) == 2 else self._checks_to_serve(path),
                 planning_time_s=wall,
                 planning_cpu_time_s=cpu,
                 simplification_time_s=time.thread_time() - begin,
@@ -204,24 +215,36 @@ class RouteAttempts:
             attempts.append((result, end))
         return attempts
 
+    def _checks_to_serve(self, path: FloatArray) -> int:
+        """State checks of a way round, tested at the planning step.
+
+        What was tried before it was found, and how finely a stretch beside an obstacle
+        is verified, depend on where the network happens to lead, which is luck.
+        """
+        motions, before = self._scene.motions, self._scene.checker.checks
+        for motion in zip(path[:-1], path[1:], strict=True):
+            motions.is_free(*motion)
+        return self._scene.checker.checks - before
+
     def own(self, grasp: int) -> tuple[FloatArray, int] | None:
         """The roadmap's own path to a test grasp, shortened, and its goal."""
         own = self._routes.over_roadmap(self._survey, grasp)
         if own is None:
             return None
-        return self._shortened([own[0]], grasp, -1), own[1]
+        return self._settled([own[0]], grasp, -1), own[1]
 
-    def _shortened(
+    def _settled(
         self, ways: Sequence[FloatArray], grasp: int, repeat: int
     ) -> FloatArray:
-        """The shortest of some ways, all of them shortened."""
+        """The cheapest of some ways, all of them settled."""
         scene = self._scene
         cell, motions = scene.loaded.cell, scene.motions
         rng = np.random.default_rng(attempt_seed(cell.seed, grasp, repeat + 1))
-        short = [
-            shorten_until(way, motions, rng, cell.roadmap.least_gain) for way in ways
+        settled = [
+            settle(way, motions.is_verified, self._pace, rng, cell.roadmap.least_gain)
+            for way in ways
         ]
-        return min(short, key=path_length_rad)
+        return min(settled, key=self._pace.of_path)
 
 
 def plan_from_scratch(

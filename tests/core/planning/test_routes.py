@@ -12,7 +12,8 @@ from reachmap.core.planning.routes import (
     shorten_until,
     spread_over,
 )
-from reachmap.core.planning.timing import path_length_rad
+from reachmap.core.planning.shortcut import settle
+from reachmap.core.planning.timing import Pace, execution_time_s, path_length_rad
 from reachmap.geometry import pieces
 
 START, GOAL = np.array([-2.0, 0.0]), np.array([2.0, 0.0])
@@ -46,6 +47,8 @@ class PlaneWithDisc(MotionChecker):
 
 
 PLANE = PlaneWithDisc()
+VELOCITY, ACCELERATION = np.array([2.0, 1.0]), np.array([3.0, 4.0])
+PACE = Pace(velocity=VELOCITY, acceleration=ACCELERATION)
 WIDE_FIRST = np.array([START, [-3, 3], [0, 1.3], [1.2, 0.7], GOAL])
 WIDE_LAST = np.array([START, [-1.2, 0.7], [0, 1.3], [3, 3], GOAL])
 
@@ -60,26 +63,68 @@ def test_shortening_comes_near_the_shortest_way():
     assert SHORTEST <= path_length_rad(short) < 1.03 * SHORTEST
 
 
+def settled(seed):
+    """A wide detour, shortened and then settled, with one seed."""
+    rng = np.random.default_rng(seed)
+    wide = np.array([START, [-3, 3], [3, 3], GOAL])
+    short = shorten_until(wide, PLANE, rng, 0.002)
+    return short, settle(short, PLANE.is_verified, PACE, rng, 0.002)
+
+
+def test_settled_paths_agree():
+    """Whatever the seed: free, never dearer, and with less spread than before."""
+    found = [settled(seed) for seed in range(12)]
+    cost = np.array([[PACE.of_path(path) for path in pair] for pair in found])
+    assert all(PLANE.path_is_free(path) for _, path in found)
+    assert all((path[[0, -1]] == [START, GOAL]).all() for _, path in found)
+    assert (cost[:, 1] <= cost[:, 0] + 1e-9).all()
+    assert cost[:, 1].std() < 0.8 * cost[:, 0].std()
+    assert cost[:, 1].mean() < 0.95 * cost[:, 0].mean()
+
+
+def test_the_settled_path_is_nearly_the_cheapest():
+    """Brute force over all paths with one stop above the disc is hardly better."""
+    side = np.linspace(-2, 2, 201)
+    x, y = np.meshgrid(side, np.linspace(1, 3, 101))
+    via = np.stack([x, y], axis=-1).reshape(-1, 2)
+    cost = PACE.of_motions(via - START) + PACE.of_motions(GOAL - via)
+    order = np.argsort(cost)
+    best = next(cost[k] for k in order if PLANE.path_is_free([START, via[k], GOAL]))
+    found = [PACE.of_path(settled(seed)[1]) for seed in range(12)]
+    assert min(found) > 0.98 * best
+    assert np.median(found) < 1.05 * best
+
+
+def test_a_pace_is_time_and_length():
+    """Stops count at corners, not at points on a straight line."""
+    bent = np.array([START, [0.0, 2.0], [1.0, 1.0], GOAL])
+    time_s = execution_time_s(bent, VELOCITY, ACCELERATION)
+    expected = time_s + 0.5 * path_length_rad(bent)
+    assert PACE.of_path(bent) == pytest.approx(expected)
+    assert PACE.of_path(pieces(bent, 0.1)) == pytest.approx(expected)
+
+
 def test_good_halves_of_two_routes_are_put_together():
     """The network's way is shorter than both routes: half of each."""
     assert PLANE.path_is_free(WIDE_FIRST)
     assert PLANE.path_is_free(WIDE_LAST)
-    network = RouteNetwork.of([WIDE_FIRST, WIDE_LAST], PLANE)
+    network = RouteNetwork.joined([WIDE_FIRST, WIDE_LAST], PACE, PLANE)
     ways = network.ways_to(GOAL[None], PLANE, SPEC)
     assert PLANE.path_is_free(ways[0])
     half = path_length_rad(WIDE_LAST[:3])
     assert path_length_rad(ways[0]) <= 2 * half + 1e-9
     assert path_length_rad(ways[0]) < 0.8 * path_length_rad(WIDE_FIRST)
-    # Lengths are those of the ways, and none is shorter than the truth.
+    # Lengths and costs are those of the ways.
     for node in range(0, len(network.Q), 5):
         way = network.route_to(node)
         assert path_length_rad(way) == pytest.approx(network.length_rad[node])
+        assert PACE.of_path(way) == pytest.approx(network.cost_s[node])
         assert PLANE.path_is_free(way)
 
 
 def test_what_is_straight_is_taken_straight():
     """A goal in sight of the start gets one way of two points."""
-    network = RouteNetwork.of([WIDE_FIRST, WIDE_LAST], PLANE)
+    network = RouteNetwork.of([WIDE_FIRST, WIDE_LAST], PACE)
     ways = network.ways_to(np.array([[2.0, 0.0], [-2.0, 3.0]]), PLANE, SPEC)
     assert len(ways) == 1
     np.testing.assert_array_equal(ways[0], [START, [-2.0, 3.0]])
@@ -87,7 +132,7 @@ def test_what_is_straight_is_taken_straight():
 
 def test_a_goal_out_of_reach_has_no_way():
     """Nothing leads into the disc."""
-    network = RouteNetwork.of([WIDE_FIRST], PLANE)
+    network = RouteNetwork.of([WIDE_FIRST], PACE)
     assert network.ways_to(np.array([[0.0, 0.0]]), PLANE, SPEC) == []
 
 

@@ -18,7 +18,7 @@ from reachmap.runtime.progress import Progress
 from reachmap.scans.cycle.connecting import connect_from, path_over, quickest
 from reachmap.scans.cycle.places import Places
 from reachmap.scans.cycle.scenes import CycleScenes
-from reachmap.scans.routes import Routes
+from reachmap.scans.routes import Routes, pace_of
 
 # Roadmaps of one drop-off: others begin at other configurations of it, and look for
 # what the first did not reach.
@@ -183,7 +183,7 @@ class Transfers:
         others = rows[rows != hub.place]
         if len(others) and len(path) > 1:
             spec, motions = self._scene.loaded.cell.roadmap, self._scene.motions
-            ways = RouteNetwork.of([path], motions).ways_to(
+            ways = RouteNetwork.of([path], pace_of(self._scene)).ways_to(
                 self._before[others], motions, spec
             )
             for way in ways:
