@@ -227,7 +227,7 @@ def test_a_store_of_another_version_is_named(path):
         text = header().line()[9:-1].replace(b'"2.0"', f'"{version}"'.encode())
         path.write_bytes(seal(text) + seal(b'{"unit":0}'))
         with (
-            pytest.raises(MapFileError, match=f"has format '{version}'.*--restart"),
+            pytest.raises(MapFileError, match=f"with format '{version}'.*--restart"),
             open_store(path, header()),
         ):
             pass
