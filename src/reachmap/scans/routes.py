@@ -227,7 +227,7 @@ class RouteAttempts:
         return self._scene.checker.checks - before
 
     def own(self, grasp: int) -> tuple[FloatArray, int] | None:
-        """The roadmap's own path to a test grasp, shortened, and its goal."""
+        """The roadmap's own path to a test grasp, settled, and its goal."""
         own = self._routes.over_roadmap(self._survey, grasp)
         if own is None:
             return None

@@ -42,7 +42,7 @@ _STRAIGHT = 1.02
 _BLOCK, _MOST_BLOCKS = 15, 40
 # Directions that differ by less are one: 1 less the cosine of their angle.
 _SAME_WAY = 1e-9
-# Routes of a network need not be perfect: what branches off is shortened once more.
+# Routes that are joined need not be perfect: they are settled afterwards.
 _ROUGH = 3.0
 
 
