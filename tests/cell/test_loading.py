@@ -257,6 +257,12 @@ def test_wrong_moveit_limits_are_refused(
     assert "limits.yaml:" in str(caught.value)
 
 
+def test_bodies_may_be_named_by_their_side(tmp_path: Path) -> None:
+    """As the walls of a bin are: "bin wall +x"."""
+    loaded = read_cell(write(tmp_path, CELL.replace("name: post", "name: guard +x")))
+    assert "guard +x" in [body.name for body in loaded.cell.bodies]
+
+
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
@@ -265,6 +271,8 @@ def test_wrong_moveit_limits_are_refused(
         ("name: post", "name: arm", "'arm' is the name of a link"),
         ("name: post", "name: bin", "'bin' is the name of a link, a frame or the bin"),
         ("name: post", "name: bin wall", r"bodies\[bin wall\]\.name: "),
+        ("name: post", "name: bin wall +x", "'bin wall \\+x' is the name of a link"),
+        ("name: post", "name: post/1", r"of letters, digits, spaces and \. \+ - _"),
         ("name: post", "name: post\n    touch: [bse]", "no link or body 'bse'"),
         ("name: post", "name: post\n    attach_to: no", "no frame 'no' in the URDF"),
         ("parent: tip", "parent: base", "no joint moves between the base and the TCP"),

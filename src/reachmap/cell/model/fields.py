@@ -43,7 +43,7 @@ Angles3 = tuple[Angle, Angle, Angle]
 Size3 = tuple[Length, Length, Length]
 SignedAxis = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
 BaseOrWorld = Literal["robot_base", "world"]
-NAMES = r"^[\w.\- ]+$"
+NAMES = r"^[\w.+\- ]+$"
 Identifier = Annotated[str, Field(min_length=1, max_length=80, pattern=NAMES)]
 Name = Annotated[str, Field(min_length=1, max_length=200)]
 Reference = Annotated[str, Field(min_length=1, max_length=4000)]

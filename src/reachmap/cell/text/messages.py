@@ -98,7 +98,7 @@ _BOUNDS = {
 }
 # What patterns mean; others stand for themselves.
 _PATTERNS = {
-    NAMES: "a name of letters, digits, spaces and . - _",
+    NAMES: "a name of letters, digits, spaces and . + - _",
     ROLLS: "listed, free, or N-fold such as 2-fold",
 }
 
