@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import tempfile
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,6 +19,13 @@ from reachmap.tools import variant
 from tests.studies.test_study import HEIGHT, RADIUS, SMALL
 
 PLACED = (*SMALL, "placement.z=[-0.2,-0.2]")
+# As few frames as place a bin.
+FEW = (
+    "workspace_scan.cubes.0.grid=[7,4]",
+    "workspace_scan.repeats=1",
+    "bin_scan.grid=[2,2]",
+    "bin_scan.repeats=1",
+)
 OBJECTIVES = ("level_average", "bin_reachability", "path_length_rad")
 
 
@@ -69,6 +78,18 @@ def test_maps_with_shared_work_are_those_from_scratch(
     for name, outcome in alone["outcomes"].items():
         for field, value in outcome.items():
             assert np.array_equal(shared["outcomes"][name][field], value, True)
+
+
+def test_a_bin_is_placed_without_files(
+    memo: Memo, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """A study that is killed leaves nothing, since its variants write nothing."""
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "missing"))
+    monkeypatch.chdir(tmp_path)
+    found = computed(toy(*FEW))
+    assert not found["cause"]
+    assert set(found["sha256"]) == {"workspace", "placement", "bin"}
+    assert not [*tmp_path.iterdir()]
 
 
 def test_what_differs_otherwise_is_never_shared(memo: Memo) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,20 +12,28 @@ from reachmap.cell.loading import LoadedCell
 from reachmap.core.memo import Memo, fingerprint
 from reachmap.core.scene import Scene
 from reachmap.errors import ReachmapError
-from reachmap.maps import BinMap, RunInfo, WorkspaceMap, write_workspace_map
+from reachmap.maps import BinMap, RunInfo, WorkspaceMap
 from reachmap.maps.format.bin import tree_from_bin_map
-from reachmap.maps.format.workspace import tree_from_workspace_map
+from reachmap.maps.format.placement import placement_from_tree, tree_from_placement
+from reachmap.maps.format.workspace import (
+    tree_from_workspace_map,
+    workspace_map_from_tree,
+)
+from reachmap.maps.provenance import cell_of_artefact
 from reachmap.maps.study.record import OBJECTIVES
+from reachmap.runtime.options import IN_PROCESS
 from reachmap.studies.assembly import failure
 from reachmap.studies.in_place import payloads_in_place
 from reachmap.studies.outcomes import Outcomes, of_bin, of_workspace
-from reachmap.tools.bin_scan import bin_scan_work, load_placed_cell
-from reachmap.tools.place_bin import place_bin
+from reachmap.tools.bin_scan import bin_scan_work
+from reachmap.tools.place_bin import PlacementChoice, placed_bin
 from reachmap.tools.workspace_scan import workspace_work
 
 OF_WORKSPACE = frozenset({"level_average"})
 # A workspace map is made without the bin, whatever is to be done with it later.
 NOT_OF_WORKSPACE = ("bin", "bin_scan", "placement")
+# What a message calls artefacts that have no files.
+MAPPED, PLACED = Path("workspace.h5"), Path("placement.h5")
 # What earlier variants have found, in this process.
 _MEMO = Memo()
 
@@ -129,8 +136,7 @@ def _computed(context: VariantContext, unit: VariantUnit) -> dict[str, Any]:
         if shared["cause"]:
             return failure(shared["cause"])
         workspace = _assembled_workspace(loaded, shared["payloads"])
-        tree = tree_from_workspace_map(workspace)
-        sha256["workspace"] = str(tree.attributes["content_sha256"])
+        sha256["workspace"] = workspace.stamp.content_sha256
         outcomes |= of_workspace(workspace)
     if not OF_WORKSPACE.issuperset(context.objectives):
         source = ""
@@ -155,21 +161,19 @@ def _assembled_workspace(loaded: LoadedCell, payloads: Sequence[Any]) -> Workspa
     """The variant's own map, of results that it shares with others."""
     work = workspace_work(loaded)
     record: WorkspaceMap = work.kind.assemble(work.document, payloads, run=RunInfo())
-    return record
+    return workspace_map_from_tree(tree_from_workspace_map(record), MAPPED)
 
 
 def _placed(workspace: WorkspaceMap) -> tuple[LoadedCell, str]:
-    """The cell with its bin placed, and the content hash of the placement."""
-    with tempfile.TemporaryDirectory(prefix="reachmap-") as folder:
-        path, output = Path(folder) / "workspace.h5", Path(folder) / "placement.h5"
-        try:
-            write_workspace_map(path, workspace)
-            place_bin(path, output)
-            return load_placed_cell(output, None, ())
-        except ReachmapError as error:
-            # The folder has another name each time; the study has not.
-            lines = [line.replace(f"{folder}/", "") for line in error.lines]
-            raise type(error)(lines) from error
+    """The cell with its bin placed, and the content hash of the placement.
+
+    As through files, but for the files: a study that is killed leaves none.
+    """
+    loaded = cell_of_artefact(workspace.provenance, str(MAPPED), ())
+    placed = placed_bin(loaded, workspace, PlacementChoice(), IN_PROCESS)
+    placement = placement_from_tree(tree_from_placement(placed.placement), PLACED)
+    loaded = cell_of_artefact(placement.provenance, str(PLACED), ())
+    return loaded, placement.stamp.content_sha256
 
 
 def _bin_map(loaded: LoadedCell, source_sha256: str) -> BinMap:
