@@ -113,7 +113,7 @@ class Slot:
         future = self.executor.submit(compute, self.ticket(ticket), index, unit)
         self.held[future] = index
 
-    def let_go(self) -> list[int]:
+    def release(self) -> list[int]:
         """End the executor; returns the units it held, in order."""
         indices = [index for index in self.held.values() if index is not None]
         self.held.clear()
@@ -144,7 +144,7 @@ class Pool:
 
     def __exit__(self, *exception: object) -> None:
         for slot in self._used.values():
-            slot.let_go()
+            slot.release()
 
     def slots(self, units: int, most: int | None = None) -> Sequence[Slot]:
         """Slots for a number of units, at most ``most``; one is this process then."""
@@ -177,7 +177,7 @@ class Pool:
         for slot in slots:  # an aborted job may have left something
             if slot.held or slot.suspects:
                 slot.suspects.clear()
-                slot.let_go()
+                slot.release()
         yield from _Round(slots, self._ticket(job), units).replies()
 
     def _ticket(self, job: Job) -> Ticket:
@@ -268,7 +268,7 @@ class _Round:
     def _after_death(self, slot: Slot, error: BaseException) -> None:
         """Reassign the units of a broken executor, and count a strike."""
         was_ready = slot.is_ready
-        indices = slot.let_go()
+        indices = slot.release()
         if not was_ready:
             self._count_failed_start(error)
             self._waiting.extendleft(reversed(indices))

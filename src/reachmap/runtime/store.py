@@ -121,7 +121,7 @@ class Store(Entries):
             "run the same command again to resume"
         )
 
-    def mend(self) -> None:
+    def repair(self) -> None:
         """Cut off a torn last line, and restore a damaged copy of the header."""
         os.ftruncate(self._descriptor, self.end)
         if self.damaged or self.copies < 2:
@@ -169,7 +169,7 @@ def open_store(path: Path, header: Header, *, restart: bool = False) -> Iterator
         except MapFileError as error:
             raise MapFileError(f"{error}; --restart discards it") from None
         _check_same_work(path, store.header, header)
-        store.mend()
+        store.repair()
         try:
             yield store
         except BaseException:

@@ -62,17 +62,17 @@ class Optimiser:
         )
         sizes = [len(factor.texts) or math.inf for factor in factors]
         self.count = int(min(float(count), math.prod(sizes)))
-        self._worth: dict[Place, float] = {}
+        self._utilities: dict[Place, float] = {}
         self._trials: dict[Place, Any] = {}
 
     def rounds(self) -> Iterator[list[Variant]]:
         """Variants to try, round by round; :meth:`tell` is called between them."""
-        while len(self._worth) < self.count:
-            wanted = min(ROUND, self.count - len(self._worth))
+        while len(self._utilities) < self.count:
+            wanted = min(ROUND, self.count - len(self._utilities))
             places: list[Place] = []
-            if not self._worth:
+            if not self._utilities:
                 places.append(self._first)
-            local = len(self._worth) >= (1.0 - LOCAL_SHARE) * self.count
+            local = len(self._utilities) >= (1.0 - LOCAL_SHARE) * self.count
             if local:
                 places += itertools.islice(self._neighbours(), wanted - len(places))
             while len(places) < wanted:
@@ -80,10 +80,10 @@ class Optimiser:
             self._pending = places
             yield [variant_at(self._factors, place) for place in places]
 
-    def tell(self, worth: Sequence[float]) -> None:
+    def tell(self, utilities: Sequence[float]) -> None:
         """Report the utilities of the variants of the last round; more is better."""
-        for place, value in zip(self._pending, worth, strict=True):
-            self._worth[place] = value
+        for place, value in zip(self._pending, utilities, strict=True):
+            self._utilities[place] = value
             trial = self._trials.pop(place, None)
             if trial is None:
                 self._study.enqueue_trial(_named(place))
@@ -95,8 +95,8 @@ class Optimiser:
         for _ in range(ASKED):
             trial = self._study.ask(self._distributions)
             place = tuple(float(trial.params[name]) for name in self._distributions)
-            if place in self._worth:
-                self._study.tell(trial, self._worth[place])
+            if place in self._utilities:
+                self._study.tell(trial, self._utilities[place])
             elif place in places:
                 self._study.tell(trial, state=self._failed)
             else:
@@ -104,12 +104,12 @@ class Optimiser:
                 return place
         every = itertools.product(*(range(len(f.texts)) for f in self._factors))
         found = (tuple(float(k) for k in place) for place in every)
-        return next(p for p in found if p not in self._worth and p not in places)
+        return next(p for p in found if p not in self._utilities and p not in places)
 
     def _neighbours(self) -> Iterator[Place]:
         """Untried places one step from the best, then from the next best."""
-        seen = set(self._worth)
-        for best in sorted(self._worth, key=lambda p: (-self._worth[p], p)):
+        seen = set(self._utilities)
+        for best in sorted(self._utilities, key=lambda p: (-self._utilities[p], p)):
             for size in range(len(STEPS)):
                 for k, factor in enumerate(self._factors):
                     for value in _beside(factor, best[k], size):

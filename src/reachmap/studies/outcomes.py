@@ -297,7 +297,7 @@ def is_met(requirements: Sequence[Requirement], values: Mapping[str, float]) -> 
 FAILED, UNMET = -1e9, -1e6
 
 
-def worth(
+def utility(
     payload: Mapping[str, Any], objective: str, requirements: Sequence[Requirement]
 ) -> float:
     """Utility of a variant; more is better."""

@@ -11,7 +11,7 @@ from reachmap.cell.loading import LoadedCell
 from reachmap.maps.study.record import LOWER_IS_BETTER, OBJECTIVES
 from reachmap.runtime.job import Job, Stages, Work
 from reachmap.studies.assembly import failure, left_out, tally, work_on_cells
-from reachmap.studies.outcomes import Requirement, worth
+from reachmap.studies.outcomes import Requirement, utility
 from reachmap.tools.variant import Proposal, VariantContext, compute_proposal
 
 # Points along each side of a grid, as a share of the cell's own: maps of a ninth, then
@@ -98,7 +98,7 @@ def poor(
 
     What fails on a coarse map is mapped finely: it may be the coarse map that is wrong.
     """
-    scores = [worth(item, name, requirements) for item in found]
+    scores = [utility(item, name, requirements) for item in found]
     order = sorted(range(len(kept)), key=lambda row: (-scores[row], row))
     best = found[order[0]]["outcomes"].get(name)
     if best is None:

@@ -14,7 +14,7 @@ from reachmap.scans.document import journal_settings
 from reachmap.studies.assembly import KIND, tally
 from reachmap.studies.design import Factor, Variant
 from reachmap.studies.optimiser import Optimiser
-from reachmap.studies.outcomes import Requirement, worth
+from reachmap.studies.outcomes import Requirement, utility
 from reachmap.tools.variant import Proposal, VariantContext, compute_proposal
 
 
@@ -78,7 +78,7 @@ def _job(
         proposals = [search.proposal(variant) for variant in variants]
         payloads = stages.run(f"round_{k}", job, proposals)
         search.optimiser.tell(
-            [worth(item, objectives[0], search.requirements) for item in payloads]
+            [utility(item, objectives[0], search.requirements) for item in payloads]
         )
         found += payloads
     return Job(function=_pick, context=found, tally=tally)
