@@ -28,9 +28,14 @@ from reachmap.placement.mapped.imaging import (
     is_in_picture,
     picture_of,
 )
-from reachmap.placement.predicted.places import best_at_each_place, pose_grid
+from reachmap.placement.predicted.places import (
+    best_at_each_place,
+    pose_grid,
+    single_pose,
+)
 from reachmap.placement.predicted.prediction import field_of, footprint_of, predict
 from reachmap.placement.predicted.region import Region
+from reachmap.placement.supports import natural_poses
 from reachmap.placement.tolerance import EXACT, Tolerance
 
 if TYPE_CHECKING:
@@ -158,12 +163,19 @@ class PlacementProblem:
         return mapped_candidates(poses, found)
 
     def predicted(self) -> list[Candidate]:
-        """Best pose at each place, by interpolation of the map."""
-        workspace = self.workspace
-        heights = [face.z + self.loaded.cell.bin.bottom_m for face in self.supports]
+        """Best pose at each place, and natural ones, by interpolation of the map."""
+        workspace, cell = self.workspace, self.loaded.cell
+        heights = [face.z + cell.bin.bottom_m for face in self.supports]
         grid = pose_grid(
             self.region, workspace.x, workspace.y, workspace.z, heights=heights
         )
-        footprint = footprint_of(self.loaded.cell, self.is_open)
-        prediction = predict(field_of(workspace), footprint, grid)
-        return list(best_at_each_place(prediction, self.reason_against))
+        natural = natural_poses(cell, self.region, self.supports)
+        field, footprint = field_of(workspace), footprint_of(cell, self.is_open)
+        found = {
+            place.pose: place
+            for poses in (grid, *map(single_pose, natural))
+            for place in best_at_each_place(
+                predict(field, footprint, poses), self.reason_against
+            )
+        }
+        return list(found.values())

@@ -25,7 +25,7 @@ def placement_settings() -> dict[str, Any]:
         "share_of_checks": exact.SHARE_OF_CHECKS,
         "steps_per_square": places.STEPS_PER_SQUARE,
         "yaw_step_deg": places.YAW_STEP_DEG,
-        "yaws_per_level": places.YAWS_PER_LEVEL,
+        "natural_poses": ["as the cell is", "middle of supports"],
         "most_unseen": search.MOST_UNSEEN,
         "near_unseen_m": search.NEAR_UNSEEN_M,
         "turns_deg": list(search.TURNS_DEG),

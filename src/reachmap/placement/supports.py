@@ -6,12 +6,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from reachmap.cell.bins.support import SLACK_M, TopFace, footprint_of_bin
+from reachmap.cell.bins.support import SLACK_M, TOUCH_M, TopFace, footprint_of_bin
 from reachmap.cell.model.cell import Cell
 from reachmap.core.collision.bin_fit import BinFit
 from reachmap.errors import SettingsError
-from reachmap.geometry import yaw_transform
-from reachmap.placement.mapped.exact import bin_at
+from reachmap.geometry import inverse_transform, yaw_transform
+from reachmap.placement.mapped.exact import Pose, bin_at
 from reachmap.placement.predicted.region import Region
 
 # A face is tried on a grid this wide [m] and at these angles until a bin fits.
@@ -49,8 +49,43 @@ def supports_in(
     return named
 
 
+def natural_poses(cell: Cell, region: Region, faces: Sequence[TopFace]) -> list[Pose]:
+    """Poses that a grid may miss where there is little room.
+
+    That is the pose in the cell, and on each face the middle, along its longest edge
+    and across. A bin that stands within :data:`TOUCH_M` of a face is put on it.
+
+    Parameters
+    ----------
+    cell : Cell
+    region : Region
+    faces : sequence of TopFace
+        In the level frame.
+    """
+    T_level_bin = inverse_transform(cell.T_base_level()) @ cell.T_base_bin()
+    x, y, z = T_level_bin[:3, 3].tolist()
+    yaw = float(np.arctan2(T_level_bin[1, 0], T_level_bin[0, 0]))
+    heights = [face.z + cell.bin.bottom_m for face in faces]
+    z = next((height for height in heights if abs(height - z) <= TOUCH_M), z)
+    found = [(x, y, z, yaw)]
+    for face, height in zip(faces, heights, strict=True):
+        edges = np.roll(face.polygon, -1, axis=0) - face.polygon
+        along = edges[np.linalg.norm(edges, axis=1).argmax()]
+        middle = (face.polygon.min(axis=0) + face.polygon.max(axis=0)) / 2
+        angle = float(np.arctan2(along[1], along[0]))
+        found += [(*middle.tolist(), height, angle + turn) for turn in (0.0, np.pi / 2)]
+    return [region.rounded(pose) for pose in found]
+
+
 def has_room(cell: Cell, region: Region, face: TopFace, fit: BinFit) -> bool:
     """Whether a bin can stand somewhere on a face, within the region."""
+    if any(
+        face.overhang_m(footprint_of_bin(cell.bin, yaw_transform(*pose))) <= SLACK_M
+        and not region.outside(np.array(pose))
+        and fit.contact(bin_at(cell, pose)) is None
+        for pose in natural_poses(cell, region, (face,))
+    ):
+        return True
     low = np.maximum(region.low[:2], face.polygon.min(axis=0))
     high = np.minimum(region.high[:2], face.polygon.max(axis=0))
     if (low > high).any():

@@ -16,7 +16,7 @@ from reachmap.placement.predicted.region import Region
 # place, a coarser one misses narrow ones.
 STEPS_PER_SQUARE = 4
 YAW_STEP_DEG = 15.0
-YAWS_PER_LEVEL = 2
+YAWS_PER_LEVEL = 12
 
 
 def pose_grid(
@@ -46,6 +46,12 @@ def pose_grid(
     yaw = yaw[yaw < yaw[0] + np.pi - 1e-9]
     at = np.unique(np.round(heights, 9)) if len(heights) else axes[2]
     return PoseGrid(x=axes[0], y=axes[1], z=at, yaw=yaw)
+
+
+def single_pose(pose: Pose) -> PoseGrid:
+    """Grid of one pose."""
+    x, y, z, yaw = (np.array([value]) for value in pose)
+    return PoseGrid(x=x, y=y, z=z, yaw=yaw)
 
 
 def best_at_each_place(
@@ -115,8 +121,7 @@ def _best_at(
 ) -> Candidate:
     grid = prediction.grid
     score = np.round(prediction.score[:, :, iy, ix], 6)
-    # The best few angles at every height are enough to find one that fits.
-    by_yaw = np.argsort(-score, axis=0, kind="stable")[:YAWS_PER_LEVEL]
+    by_yaw = np.argsort(-score, axis=0, kind="stable")
     tried = [(int(k), iz) for iz in range(len(grid.z)) for k in by_yaw[:, iz]]
     tried.sort(key=lambda place: -score[place])
     first = ""

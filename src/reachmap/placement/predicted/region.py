@@ -44,6 +44,15 @@ class Region:
                 return name
         return ""
 
+    def rounded(
+        self, pose: tuple[float, float, float, float]
+    ) -> tuple[float, float, float, float]:
+        """A pose without rounding errors, turned into the range of angles."""
+        x, y, z, yaw = pose
+        low = float(self.low[3])
+        within = low + (yaw - low + SLACK) % self.period_rad - SLACK
+        return (round(x, 9), round(y, 9), round(z, 9), round(within, 9))
+
     def fixed(self, name: str) -> bool:
         """Whether a value may not change."""
         k = AXES.index(name)
