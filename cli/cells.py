@@ -25,7 +25,7 @@ from reachmap.cli.terminal import print_answer
     shell_complete=complete_cells,
     help="Write a shipped cell, or the cell that an artefact was made from, as YAML.",
 )
-@output_option(help="Where --export writes; by default standard output.")
+@output_option(holds=".yaml", help="Where --export writes; by default standard output.")
 @overwrite_option
 @json_option
 def command(

@@ -51,7 +51,9 @@ from reachmap.cli.terminal import print_answer
     show_default=True,
     help="Which uncovered part to pick next: the highest, or the one of least cost.",
 )
-@output_option(help="Also write the pose and the outcome of every part (JSON).")
+@output_option(
+    holds=".json", help="Also write the pose and the outcome of every part (JSON)."
+)
 @click.option(
     "--picture",
     type=OUTPUT_PATH,

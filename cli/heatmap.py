@@ -55,7 +55,9 @@ from reachmap.cli.terminal import print_answer
 @click.option(
     "--csv", "tables", is_flag=True, help="Also write the numbers as CSV files."
 )
-@options.output_option("heatmaps", help="Folder for the pictures.")
+@options.output_option(
+    "heatmaps", holds=options.A_FOLDER, help="Folder for the pictures."
+)
 @options.overwrite_option
 @options.json_option
 def command(artefact: Path, as_json: bool, **settings: Any) -> None:

@@ -17,7 +17,7 @@ from reachmap.cli.terminal import print_answer
 
 @click.command()
 @click.argument("shards", metavar="SHARD...", nargs=-1, required=True, type=INPUT_FILE)
-@output_option(required=True, help="Write the merged artefact here.")
+@output_option(holds=".h5", required=True, help="Write the merged artefact here.")
 @overwrite_option
 @json_option
 def command(

@@ -50,6 +50,45 @@ FOR_ALL = frozenset({"cell", "workers", "executor", "progress"})
 
 INPUT_FILE = click.Path(path_type=Path)
 OUTPUT_PATH = click.Path(path_type=Path)
+# What a name ends in promises what is in the file.
+SUFFIXES = {
+    ".h5": "an artefact (HDF5)",
+    ".json": "JSON",
+    ".yaml": "a cell (YAML)",
+    ".html": "a page",
+    ".png": "a picture",
+    ".svg": "a picture",
+    ".csv": "a table",
+    ".urdf": "a robot",
+}
+A_FOLDER = "a folder"
+
+
+class OutputPath(click.Path):
+    """A path whose suffix does not promise another kind of file.
+
+    Parameters
+    ----------
+    holds : str
+        The suffix of what is written; :data:`A_FOLDER`, which should have none of
+        them; "" for whatever the name says.
+    """
+
+    def __init__(self, holds: str) -> None:
+        super().__init__(path_type=Path)
+        self.holds = holds
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> Any:
+        """Refuse the suffix of another kind; any that is not known will do."""
+        path = Path(super().convert(value, param, ctx))
+        suffix = path.suffix.lower()
+        if self.holds and suffix != self.holds and suffix in SUFFIXES:
+            kind = SUFFIXES.get(self.holds, self.holds)
+            end = f", in a name that ends in {self.holds}" if kind != self.holds else ""
+            self.fail(f"{path}: the output is {kind}{end}", param, ctx)
+        return path
 
 
 class SharedOption(click.Option):
@@ -193,7 +232,11 @@ json_option = _option(
 
 
 def output_option(
-    default: str | None = None, *, required: bool = False, help: str | None = None
+    default: str | None = None,
+    *,
+    holds: str = "",
+    required: bool = False,
+    help: str | None = None,
 ) -> Decorator[Any]:
     """``-o/--output PATH`` with the command's own default name.
 
@@ -201,6 +244,8 @@ def output_option(
     ----------
     default : str, optional
         Name in the current folder, such as ``"bin.h5"``; None leaves it to the tool.
+    holds : str
+        As in :class:`OutputPath`, where the default name does not say it.
     required : bool
         Whether the command has no sensible default.
     help : str, optional
@@ -211,7 +256,7 @@ def output_option(
     return _option(
         "-o",
         "--output",
-        type=OUTPUT_PATH,
+        type=OutputPath(holds or Path(default or "").suffix),
         **usual,
         required=required,
         metavar="PATH",

@@ -52,8 +52,9 @@ class ShareType(click.ParamType):  # type: ignore[type-arg, unused-ignore]
     help="The bin map to look costs up in.",
 )
 @options.output_option(
+    holds=".json",
     help="Write the ranked list here and print a table; a folder gets one file per "
-    "list. Without it, or with -, the JSON is printed."
+    "list. Without it, or with -, the JSON is printed.",
 )
 @list_options
 @click.option(

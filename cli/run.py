@@ -20,7 +20,7 @@ from reachmap.runtime.options import RunOptions
     metavar="FILE",
     help="A grasp list to rank. Repeatable.",
 )
-@options.output_option("run", help="Folder for everything.")
+@options.output_option("run", holds=options.A_FOLDER, help="Folder for everything.")
 @options.set_option
 @options.seed_option
 @options.restart_option

@@ -67,7 +67,9 @@ if TYPE_CHECKING:
     help="Write MAP.calibration.json beside the map, which makes the probabilities of "
     "`rank` calibrated.",
 )
-@options.output_option(help="Write the results of every grasp here, as JSON.")
+@options.output_option(
+    holds=".json", help="Write the results of every grasp here, as JSON."
+)
 @options.set_option
 @options.seed_option
 @options.run_options

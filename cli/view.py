@@ -32,7 +32,7 @@ def _test_grasp(
 @click.option(
     "--html",
     "page",
-    type=options.OUTPUT_PATH,
+    type=options.OutputPath(".html"),
     metavar="PATH",
     help="Write one page with playback that needs no server and no network, and exit.",
 )

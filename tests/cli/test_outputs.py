@@ -105,6 +105,12 @@ def run(command: str, monkeypatch: pytest.MonkeyPatch) -> Result:
         return CliRunner().invoke(group, command.split())
 
 
+def place_of(command: str, name: str) -> str:
+    """A name of an output that says no more about its contents than it must."""
+    is_picture = "--picture {o}" in command or "--chart {o}" in command
+    return f"{name}.png" if is_picture else name
+
+
 def state_of(folder: Path) -> dict[str, bytes]:
     """Everything in a folder."""
     return {item.name: item.read_bytes() for item in folder.iterdir()}
@@ -116,7 +122,7 @@ def test_no_command_replaces_what_it_reads(
     folder: Path, monkeypatch: pytest.MonkeyPatch, command: str, name: str, alias: str
 ) -> None:
     """Not even with --overwrite, and under no other name, however far it looks."""
-    output = name if alias == "same" else f"alias{Path(name).suffix}"
+    output = name if alias == "same" else place_of(command, "alias")
     if alias == "hard":
         os.link(name, output)
     elif alias == "symbolic":
@@ -124,7 +130,10 @@ def test_no_command_replaces_what_it_reads(
     before = state_of(folder)
     result = run(f"{command.format(o=output)} --overwrite", monkeypatch)
     assert result.exit_code == 2, result.output
-    assert f"{output}: would replace " in result.stderr
+    if alias == "same" and "the output is" in result.stderr:
+        assert f"{output}: the output is " in result.stderr  # by its suffix alone
+    else:
+        assert f"{output}: would replace " in result.stderr
     assert state_of(folder) == before
 
 
@@ -134,7 +143,7 @@ def test_what_is_no_file_is_refused(
     folder: Path, monkeypatch: pytest.MonkeyPatch, command: str, kind: str
 ) -> None:
     """Pipes, sockets, devices and folders are neither written to nor replaced."""
-    place = folder / "place.png"
+    place = folder / place_of(command, "place")
     if kind == "folder" and ("rank" in command or "compare" in command):
         pytest.skip("this command writes into folders")
     with make(place, kind):
@@ -165,9 +174,37 @@ def test_an_existing_output_is_refused_before_any_work(
     folder: Path, monkeypatch: pytest.MonkeyPatch, command: str
 ) -> None:
     """Without --overwrite, and before the scene is built."""
-    place = folder / "place.png"
+    place = folder / place_of(command, "place")
     place.write_bytes(b"precious")
     result = run(command.format(o=place), monkeypatch)
     assert result.exit_code == 2, result.output
-    assert "place.png: exists already" in result.stderr
+    assert f"{place.name}: exists already" in result.stderr
     assert place.read_bytes() == b"precious"
+
+
+@pytest.mark.parametrize(
+    ("command", "message"),
+    [
+        (
+            "study cell.yaml --vary seed=1,2 -o s.png",
+            "s.png: the output is an artefact (HDF5), in a name that ends in .h5",
+        ),
+        ("bin-scan --cell cell.yaml -o b.JSON", "b.JSON: the output is an artefact"),
+        ("merge a.journal b.journal -o m.csv", "m.csv: the output is an artefact"),
+        ("report . -o r.svg", "r.svg: the output is a page"),
+        ("rank g.json --map bin.h5 -o r.h5", "r.h5: the output is JSON"),
+        ("new-cell arm.urdf -o c.urdf", "c.urdf: the output is a cell (YAML)"),
+        ("view bin.h5 --html v.png", "v.png: the output is a page"),
+        ("heatmap bin.h5 -o p.png", "p.png: the output is a folder"),
+        ("run cell.yaml -o run.h5", "run.h5: the output is a folder"),
+    ],
+)
+def test_a_name_does_not_promise_another_kind_of_file(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, command: str, message: str
+) -> None:
+    """Readers go by suffixes; a map called .png would be found damaged by each."""
+    before = state_of(folder)
+    result = run(command, monkeypatch)
+    assert result.exit_code == 2, result.output
+    assert message in result.stderr
+    assert state_of(folder) == before

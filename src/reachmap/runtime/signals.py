@@ -8,6 +8,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
 
+from reachmap.errors import ReachmapError
+
 STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
@@ -62,6 +64,13 @@ def stop_signals() -> Iterator[StopRequest]:
         for number in before:
             signal.signal(number, request.handle)
         yield request
+    except ReachmapError:
+        raise
+    except Exception as error:
+        # Libraries that call back make an error of their own of the interrupt.
+        if request.requested:
+            raise KeyboardInterrupt from error
+        raise
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)

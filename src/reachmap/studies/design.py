@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import json
 import math
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -22,6 +23,8 @@ MAX_VARIANTS = 10_000
 # Digits of a value of an even range: 0.1 + 0.2 is to read 0.3.
 DIGITS = 12
 CHOICE = "choice"
+# YAML writes .nan and .inf, Python without the dot.
+DOT = re.compile(r"\.(?=nan|inf)", re.IGNORECASE)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -135,6 +138,8 @@ def _factor(text: str, base: LoadedCell, sampled: bool) -> Factor:
         texts = () if sampled else tuple(f"{value:.12g}" for value in numbers)
         return Factor(name=name, key=key, unit=unit, texts=texts, numbers=numbers)
     items = tuple(_split(values))
+    for item in items:
+        _require_value(text, item)
     if not all(items) or len(set(items)) < len(items):
         raise SettingsError(f"--vary {text!r:.120}: an empty or repeated value")
     parsed = [_number(item) for item in items]
@@ -148,6 +153,18 @@ def _factor(text: str, base: LoadedCell, sampled: bool) -> Factor:
         )
     numbers = tuple(value for value in parsed if value is not None)
     return Factor(name=name, key=key, unit=unit, texts=items, numbers=numbers)
+
+
+def _require_value(text: str, item: str) -> None:
+    """Refuse what looks like a number or a range, and is none."""
+    first, colon, _ = item.partition(":")
+    if colon and _number(first) is not None:
+        raise SettingsError(
+            f"--vary {text:.120}: {item!r:.60} is no range; expected NAME=LOW:HIGH:N, "
+            "alone, with finite numbers LOW and HIGH"
+        )
+    if _is_infinite(item):
+        raise SettingsError(f"--vary {text:.120}: {item} is not a finite number")
 
 
 def _require_known(name: str, base: LoadedCell) -> None:
@@ -183,6 +200,14 @@ def _number(text: str) -> float | None:
     except ValueError:
         return None
     return value if math.isfinite(value) else None
+
+
+def _is_infinite(text: str) -> bool:
+    """Whether a text is a number, but none that is finite."""
+    try:
+        return not math.isfinite(float(DOT.sub("", text)))
+    except ValueError:
+        return False
 
 
 def _split(text: str) -> list[str]:
