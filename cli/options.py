@@ -82,7 +82,7 @@ class OutputPath(click.Path):
         self, value: Any, param: click.Parameter | None, ctx: click.Context | None
     ) -> Any:
         """Refuse the suffix of another kind; any that is not known will do."""
-        path = Path(super().convert(value, param, ctx))
+        path = Path(os.fsdecode(super().convert(value, param, ctx)))
         suffix = path.suffix.lower()
         if self.holds and suffix != self.holds and suffix in SUFFIXES:
             kind = SUFFIXES.get(self.holds, self.holds)
