@@ -10,6 +10,7 @@ import sys
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from datetime import datetime
+from functools import lru_cache
 from importlib import metadata
 from typing import TYPE_CHECKING, Any
 
@@ -35,8 +36,12 @@ def package_versions(names: Sequence[str] = PACKAGES) -> dict[str, str]:
     versions = {"python": sys.version.split()[0]}
     for name in names:
         with contextlib.suppress(metadata.PackageNotFoundError):
-            versions[name] = metadata.version(name)
+            versions[name] = _version(name)
     return versions
+
+
+# Looked up in files, which takes longer than the rest of a map's provenance.
+_version = lru_cache(maxsize=None)(metadata.version)
 
 
 def collect_provenance(

@@ -206,7 +206,7 @@ def placed_bin(
     clock = RunClock(workers=run.workers)
     workspace_map = upright_workspace(workspace_map, loaded.cell.T_base_level())
     region = _region(loaded, workspace_map, choice)
-    scene = Scene.build(loaded, with_bin=False)
+    scene = Scene.shared(loaded, with_bin=False)
     scene.require_free_scan_configuration()
     is_open = open_frames(scene.robot, loaded)
     with open_evaluator(
@@ -357,7 +357,7 @@ def _record(
         bin_pose=T_base_bin,
         scan_configuration_rad=dict(zip(names, q.tolist(), strict=True)),
     )
-    scene = Scene.build(placed, with_bin=True)
+    scene = Scene.shared(placed, with_bin=True)
     scene.require_free_scan_configuration()
     limit = tool_limit(scene.robot, placed, problem.is_open)
     rule = "given" if choice.bin_pose is not None else choice.rule

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -23,7 +24,7 @@ from reachmap.cell.meshes.reading import MeshError, read_mesh
 from reachmap.cell.model.bin_parts import BinPart, bin_parts
 from reachmap.cell.model.bodies import BinSpec
 from reachmap.cell.model.fields import Shape
-from reachmap.cell.model.shapes import Solid
+from reachmap.cell.model.shapes import Solid, TriangleMesh
 from reachmap.cell.pick_cycle import PART
 from reachmap.core.collision.held_part import HeldPart
 from reachmap.core.collision.shapes import coal_shape
@@ -245,12 +246,21 @@ def _body_shape(loaded: LoadedCell, name: str, shape: Shape) -> Solid:
 
 def _read_mesh(loaded: LoadedCell, key: str, owner: str, scale: Any) -> Solid:
     path = loaded.mesh_paths[key]
+    factors = tuple(np.broadcast_to(np.asarray(scale, float), 3).tolist())
     try:
-        return read_mesh(path.read_bytes(), path.suffix).scaled(scale)
+        return _scaled_mesh(path.read_bytes(), path.suffix, factors)
     except (OSError, MeshError) as error:
         raise SceneError(
             f"{owner}: {path.name} cannot be read as a mesh ({error})"
         ) from error
+
+
+@lru_cache(maxsize=64)
+def _scaled_mesh(
+    data: bytes, suffix: str, factors: tuple[float, float, float]
+) -> TriangleMesh:
+    """The same object for the same file: scenes of one cell share their meshes."""
+    return read_mesh(data, suffix).scaled(factors)
 
 
 class _Builder:

@@ -124,13 +124,16 @@ class CollisionChecker:
 
     def _start_engine(self) -> None:
         self._data = self._model.createData()
-        self._broadphase, self._base = self._broadphase_with(
-            self.bodies, self._pair_margins_m(FREE)
-        )
-        self._ladder = [
-            (step, *self._broadphase_with(self.hulls, self._pair_margins_m(rung)))
-            for rung, step in enumerate(LADDER_M)
-        ]
+        # Made when first asked: bodies are moved more often than all rungs are used.
+        self._engines: dict[int, tuple[Any, Any]] = {}
+
+    def _engine(self, about: int) -> tuple[Any, Any]:
+        """Broadphase and results, of FREE or a rung of the ladder."""
+        if about not in self._engines:
+            geometry = self.bodies if about == FREE else self.hulls
+            margins_m = self._pair_margins_m(about)
+            self._engines[about] = self._broadphase_with(geometry, margins_m)
+        return self._engines[about]
 
     def _pair_margins_m(self, about: int) -> FloatArray:
         if about == FREE:
@@ -175,7 +178,7 @@ class CollisionChecker:
         free = not pin.computeCollisions(
             self._model,
             self._data,
-            self._broadphase,
+            self._engine(FREE)[0],
             self.robot.body_configuration(q),
             True,
         )
@@ -190,7 +193,7 @@ class CollisionChecker:
         brings a pair closer than the safety margin. False says nothing; the answer is
         conservative, as it uses convex hulls and the next wider step of the ladder.
         """
-        for rung, (step, _, _) in enumerate(self._ladder):
+        for rung, step in enumerate(LADDER_M):
             if step >= distance_m:
                 return self._is_clear_at(rung, q)
         return False
@@ -200,7 +203,7 @@ class CollisionChecker:
         clear = not pin.computeCollisions(
             self._model,
             self._data,
-            self._ladder[rung][1],
+            self._engine(rung)[0],
             self.robot.body_configuration(q),
             True,
         )
@@ -292,7 +295,7 @@ class CollisionChecker:
 
     def touching_pairs(self, q: FloatArray) -> tuple[int, ...]:
         """Indices into ``body_pairs`` of all pairs that touch at q."""
-        data = self._base
+        data = self._engine(FREE)[1]
         q_bodies = self.robot.body_configuration(q)
         pin.computeCollisions(
             self._model, self._data, self.bodies, data, q_bodies, False

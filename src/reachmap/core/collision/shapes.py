@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Any
 
 import coal
@@ -20,18 +21,7 @@ MOST_NEIGHBOURS = 250
 def coal_shape(shape: Solid) -> Any:
     """Collision geometry of a shape; a mesh is a surface, with nothing inside."""
     if isinstance(shape, TriangleMesh):
-        vertices = shape.vertices
-        low, high = vertices.min(axis=0), vertices.max(axis=0)
-        if (high - low).min() < FLAT_M:
-            # The broadphase passes over boxes without volume: two corners that no
-            # triangle uses give this one some.
-            vertices = np.vstack([vertices, low - FLAT_M, high + FLAT_M])
-        surface = coal.BVHModelOBBRSS()
-        surface.beginModel(len(shape.triangles), len(vertices))
-        surface.addVertices(np.ascontiguousarray(vertices, float))
-        surface.addTriangles(np.ascontiguousarray(shape.triangles, np.int64))
-        surface.endModel()
-        return surface
+        return _surface(shape)
     if isinstance(shape, ConvexBody):
         return convex_hull(shape.points)
     kind, value = shape.kind()
@@ -46,6 +36,23 @@ def coal_shape(shape: Solid) -> Any:
     raise ValueError(f"{value.file}: the mesh has not been read")
 
 
+@lru_cache(maxsize=64)
+def _surface(mesh: TriangleMesh) -> Any:
+    """Surface of a mesh, built once: engines only read it."""
+    vertices = mesh.vertices
+    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    if (high - low).min() < FLAT_M:
+        # The broadphase passes over boxes without volume: two corners that no
+        # triangle uses give this one some.
+        vertices = np.vstack([vertices, low - FLAT_M, high + FLAT_M])
+    surface = coal.BVHModelOBBRSS()
+    surface.beginModel(len(mesh.triangles), len(vertices))
+    surface.addVertices(np.ascontiguousarray(vertices, float))
+    surface.addTriangles(np.ascontiguousarray(mesh.triangles, np.int64))
+    surface.endModel()
+    return surface
+
+
 def convex_hull(points: FloatArray) -> Any:
     """Convex body around points (n, 3); None where they lie in a plane.
 
@@ -53,7 +60,14 @@ def convex_hull(points: FloatArray) -> Any:
     a corner has more neighbours than coal can count (the tip of a fine cone), every
     second of them is left out and the rest inflated until it contains all points.
     """
-    points = np.asarray(points, float)
+    points = np.ascontiguousarray(points, float)
+    return _hull(points.tobytes())
+
+
+@lru_cache(maxsize=128)
+def _hull(data: bytes) -> Any:
+    """Hull of points (n, 3) given as bytes, built once: engines only read it."""
+    points = np.frombuffer(data).reshape(-1, 3)
     # Below a millionth of the size a body has no inside that an engine could use.
     spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
     if len(points) < 4 or spread[2] < 1e-6 * spread[0]:
