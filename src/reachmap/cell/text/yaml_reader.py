@@ -12,7 +12,9 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Iterator, Mapping
+from copy import deepcopy
 from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -115,6 +117,17 @@ class Document:
     mistakes: list[Mistake] = field(default_factory=list)
     _moved: dict[Location, Location] = field(default_factory=dict)
 
+    def copy(self) -> Document:
+        """A document that may be changed on its own."""
+        return Document(
+            source=self.source,
+            data=deepcopy(self.data),
+            places=dict(self.places),
+            key_places=dict(self.key_places),
+            mistakes=list(self.mistakes),
+            _moved=dict(self._moved),
+        )
+
     def move(self, written: Location, location: Location) -> None:
         """Take what is written at one location for what is at another from now on."""
         for places in (self.places, self.key_places):
@@ -204,9 +217,21 @@ def parse_yaml(
     """
     if len(text) > MAX_TEXT_BYTES:
         raise CellError(f"{source}: larger than the limit of {MAX_TEXT_BYTES:,} bytes")
+    return _parse(text, source, tags) if tags else _parsed(text, source).copy()
+
+
+@lru_cache(maxsize=4)
+def _parsed(text: str, source: str) -> Document:
+    """A study reads the same text for each of its variants."""
+    return _parse(text, source, {})
+
+
+def _parse(
+    text: str, source: str, tags: Mapping[str, Callable[[float], float]]
+) -> Document:
     document = Document(source=source)
     try:
-        _Builder(document, tags or {}).build(YAML(typ="safe", pure=True).parse(text))
+        _Builder(document, tags).build(YAML(typ="safe", pure=True).parse(text))
     except CellError:
         raise  # a ValueError too, which the last clause would wrap
     except MarkedYAMLError as error:
