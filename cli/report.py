@@ -18,12 +18,12 @@ from reachmap.cli.terminal import print_answer
 def command(folder: Path, output: Path, overwrite: bool, as_json: bool) -> None:
     """Write a report of a run as one self-contained page.
 
-    FOLDER holds workspace.h5, placement.h5, bin.h5, ranked.json and validation.json,
-    or some of them; the page says what is missing. It answers where the bin goes, how
-    much of it is reached and which grasps come first, shows the cell and the maps,
-    names the bodies in the way, and lists settings and provenance. Pictures are
-    embedded; the page loads nothing from the network and prints well. Its name is
-    printed.
+    FOLDER holds workspace.h5, placement.h5, bin.h5, study.h5, ranked.json and
+    validation.json, or some of them; the page says what is missing. It answers where
+    the bin goes, how much of it is reached, which grasps come first and which change
+    of a study helps most, shows the cell and the maps, names the bodies in the way,
+    and lists settings and provenance. Pictures are embedded; the page loads nothing
+    from the network and prints well. Its name is printed.
 
     Example: reachmap report run -o report.html
     """

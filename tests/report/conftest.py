@@ -17,7 +17,10 @@ from reachmap.maps import (
     write_placement,
     write_workspace_map,
 )
+from reachmap.maps.study.format import write_study
+from reachmap.maps.study.record import Study
 from reachmap.tools.rank import rank
+from tests.studies.test_significance_of_studies import study_of
 from tests.support.synthetic_maps import (
     synthetic_bin_map,
     synthetic_placement,
@@ -78,6 +81,14 @@ def write_run(folder: Path) -> None:
         output=folder / "ranked.json",
     )
     (folder / "validation.json").write_text(json.dumps(VALIDATION))
+    write_study(folder / "study.h5", small_study())
+
+
+def small_study() -> Study:
+    """A base, a variant that is better beyond doubt, and one that is not."""
+    rng = np.random.default_rng(0)
+    shares = (0.5, 0.9, 0.5)
+    return study_of([rng.random((14, 20, 27)) < share for share in shares])
 
 
 @pytest.fixture(scope="session")

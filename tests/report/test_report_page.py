@@ -14,17 +14,20 @@ from click.testing import CliRunner, Result
 
 from reachmap.cli import group
 from reachmap.maps import write_bin_map, write_workspace_map
+from reachmap.maps.study.format import read_study
 from reachmap.maps.summary.statistics import saturation_of
+from reachmap.maps.summary.study import sentence
 from reachmap.report.page import CONTENTS
 from tests.support.synthetic_maps import synthetic_bin_map, synthetic_provenance
 from tests.support.toy_artefacts import toy_bin_map, toy_workspace
 
 DRAWINGS = {
-    "map_parts": ("draw_level", "draw_overview", "draw_placement", "draw_approach",
+    "maps": ("draw_level", "draw_overview", "draw_placement", "draw_approach",
                   "draw_reachability", "draw_costs", "draw_saturation",
                   "draw_directions", "draw_clearance"),
-    "cause_part": ("draw_causes",),
-    "ranking_part": ("ranking_chart",),
+    "cause": ("draw_causes",),
+    "ranking": ("ranking_chart",),
+    "study": ("study_album",),
 }  # fmt: skip
 VOID = {"meta", "img", "br", "link"}
 
@@ -106,7 +109,7 @@ def leave_drawing_out(patch: pytest.MonkeyPatch) -> None:
     """Every picture but that of the cell."""
     for part, names in DRAWINGS.items():
         for name in names:
-            patch.setattr(f"reachmap.report.{part}.{name}", lambda *a, **k: None)
+            patch.setattr(f"reachmap.report.parts.{part}.{name}", lambda *a, **k: [])
     patch.setattr(
         "reachmap.report.blocks.figure_bytes", lambda *a, **k: b"\x89PNG" + bytes(20)
     )
@@ -313,3 +316,21 @@ def test_a_page_is_not_overwritten(finished_run: Path, tmp_path: Path) -> None:
     assert (tmp_path / "report.html").read_text() == "mine"
     result = run(finished_run, "-o", tmp_path / "report.html", "--overwrite")
     assert result.exit_code == 0
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_a_study_is_told_with_its_sentences(finished_run: Path, tmp_path: Path) -> None:
+    """The best variant, by itself as well: then nothing else is asked for."""
+    folder = tmp_path / "alone"
+    folder.mkdir()
+    shutil.copy(finished_run / "study.h5", folder)
+    study = read_study(folder / "study.h5")
+    whole = Outline(page_of(finished_run, tmp_path, "whole.html"))
+    alone = Outline(page_of(folder, tmp_path, "alone.html"))
+    for outline in (whole, alone):
+        assert sentence(study, 1, 0) in outline.text
+        assert "not distinguishable from" in outline.text
+        assert f"{study.objective[1, 0]:.1f} % (" in outline.text
+    assert alone.ids == ["cell", "study", "provenance"]
+    assert "is not in this folder" not in alone.text
+    assert "not known yet" not in alone.text

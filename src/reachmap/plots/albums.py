@@ -266,7 +266,10 @@ def _candidate_table(placement: BinPlacement) -> str:
 
 
 def study_album(
-    study: Study, *, percent_map: PercentMap = "RdYlGn"
+    study: Study,
+    *,
+    percent_map: PercentMap = "RdYlGn",
+    effects_on: Sequence[str] | None = None,
 ) -> list[Picture | Table]:
     """List the pictures of a study.
 
@@ -278,6 +281,8 @@ def study_album(
     is_grid, count = study.design == "grid", len(study.parameter_names)
     known = study.done & ~np.isnan(study.objective[:, 0])
     for k, name in enumerate(study.objective_names):
+        if effects_on is not None and name not in effects_on:
+            continue
         effects = partial(draw_main_effects, study, k)
         title = f"Main effects on {name}"
         items.append(Picture(name=f"effects_{name}", title=title, draw=effects))

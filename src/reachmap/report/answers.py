@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from reachmap.maps.cycle.summary import summarise_cycle
+from reachmap.maps.study.record import Study
 from reachmap.maps.summary.clearance import clearance_shares
 from reachmap.maps.summary.directions import reached_shares
 from reachmap.maps.summary.emptying import emptying_of
@@ -15,6 +16,7 @@ from reachmap.maps.summary.statistics import (
     level_means,
     saturation_of,
 )
+from reachmap.maps.summary.study import changes_text, sentence
 from reachmap.report.blocks import Tile
 from reachmap.report.folder import RunFolder
 from reachmap.report.numbers import count, interval, number, percent, signed
@@ -24,7 +26,9 @@ FIRST_PICKS = 3
 
 
 def headline_answers(run: RunFolder) -> list[Tile]:
-    """Tiles: level, bin, share of test grasps, room, cycle, emptying, first picks."""
+    """Tiles: level, bin, share of grasps, room, cycle, emptying, first picks, study."""
+    if run.is_study_alone and run.study is not None:
+        return [_study(run.study)]
     tiles = [
         _level(run),
         _bin(run),
@@ -33,6 +37,7 @@ def headline_answers(run: RunFolder) -> list[Tile]:
         _cycle(run),
         _emptying(run),
         _picks(run),
+        None if run.study is None else _study(run.study),
     ]
     return [tile for tile in tiles if tile is not None]
 
@@ -187,3 +192,18 @@ def _picks(run: RunFolder) -> Tile:
         f"{cost} {', '.join(number(row.cost, 2) for row in first)}. "
         f"{len(reached)} of {count(len(rows), 'supplied grasp')} are reached.",
     )
+
+
+def _study(study: Study) -> Tile:
+    question = "Which change helps most?"
+    name, best = study.objective_names[0], study.best
+    if best < 0:
+        return _tile(question, "none", "No variant meets the requirements.")
+    if best == study.base:
+        variants = count(int(study.done.sum()), "variant")
+        why = f"None of {variants} has a better {name} than the base."
+        return _tile(question, "leave it as it is", why)
+    why = "No test grasp is shared with the base."
+    if study.done[study.base]:
+        why = f"{sentence(study, best, 0)}."
+    return _tile(question, changes_text(study, best), why)

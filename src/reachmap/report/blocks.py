@@ -10,7 +10,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeAlias
 
-from reachmap.maps.format.registry import Artefact
+from reachmap.maps.format.registry import Artefact, Result
 from reachmap.plots.parts.style import figure_bytes
 
 if TYPE_CHECKING:
@@ -141,14 +141,14 @@ def facts(pairs: Iterable[tuple[str, object]]) -> Table | None:
     return table((), rows, "<<", kind="facts") if rows else None
 
 
-def drawn(figure: Drawing, caption: str, record: Artefact) -> Picture:
+def drawn(figure: Drawing, caption: str, record: Artefact | Result) -> Picture:
     """Render a figure into the page.
 
     Parameters
     ----------
     figure : matplotlib.figure.Figure
     caption : str
-    record : WorkspaceMap, BinMap or BinPlacement
+    record : WorkspaceMap, BinMap, BinPlacement or Study
         What it shows; its hash is kept in the picture.
     """
     png = figure_bytes(

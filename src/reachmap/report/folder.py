@@ -17,6 +17,8 @@ from reachmap.maps import (
 )
 from reachmap.maps.format.registry import Artefact
 from reachmap.maps.records import BinMap, BinPlacement, WorkspaceMap
+from reachmap.maps.study.format import read_study
+from reachmap.maps.study.record import Study
 from reachmap.ranking.lists.json_text import parse_json
 
 MAX_JSON_BYTES = 64 * 2**20
@@ -26,7 +28,10 @@ ARTEFACTS = {
     "workspace": ("workspace_map", "workspace.h5", "reachmap workspace-scan"),
     "placement": ("bin_placement", "placement.h5", "reachmap place-bin"),
     "bin": ("bin_map", "bin.h5", "reachmap bin-scan"),
+    "study": ("study", "study.h5", "reachmap study"),
 }
+OPTIONAL = frozenset({"study"})
+"""Roles that a whole run does without."""
 LISTS = {
     "ranked": ("ranked.json", "reachmap rank GRASPS -o ranked.json"),
     "validation": (
@@ -52,13 +57,13 @@ class RunFolder:
     ----------
     name : str
         Name of the folder.
-    workspace, placement, bin_map : record or None
+    workspace, placement, bin_map, study : record or None
     ranked : tuple of mapping
         Ranked grasp lists.
     validation : mapping or None
     files : mapping of str to str
-        Role ("workspace", "placement", "bin", "ranked", "validation") to the name of
-        the file it was read from.
+        Role ("workspace", "placement", "bin", "study", "ranked", "validation") to the
+        name of the file it was read from.
     missing : mapping of str to str
         Usual name of what is not there, to the command that makes it.
     warnings : tuple of str
@@ -69,6 +74,7 @@ class RunFolder:
     workspace: WorkspaceMap | None = None
     placement: BinPlacement | None = None
     bin_map: BinMap | None = None
+    study: Study | None = None
     ranked: tuple[Mapping[str, Any], ...] = ()
     validation: Mapping[str, Any] | None = None
     files: Mapping[str, str] = field(default_factory=dict)
@@ -76,19 +82,26 @@ class RunFolder:
     warnings: tuple[str, ...] = ()
 
     @property
-    def artefacts(self) -> dict[str, Artefact]:
-        """Artefacts by their role, in the order of the pipeline."""
-        found = {
+    def artefacts(self) -> dict[str, Artefact | Study]:
+        """Artefacts by their role, in the order of the pipeline; a study comes last."""
+        found: dict[str, Artefact | Study | None] = {
             "workspace": self.workspace,
             "placement": self.placement,
             "bin": self.bin_map,
+            "study": self.study,
         }
         return {role: record for role, record in found.items() if record is not None}
 
     @property
-    def latest(self) -> Artefact:
-        """The artefact furthest down the pipeline, whose cell is the current one."""
-        return list(self.artefacts.values())[-1]
+    def is_study_alone(self) -> bool:
+        """Whether there is nothing of the pipeline."""
+        return list(self.artefacts) == ["study"]
+
+    @property
+    def latest(self) -> str:
+        """Role of the artefact furthest down the pipeline, whose cell is current."""
+        *_, last = (r for r in self.artefacts if self.is_study_alone or r != "study")
+        return last
 
 
 class _Reader:
@@ -111,7 +124,8 @@ class _Reader:
                 if artefact_kind(other) == kind
             ]
             if len(others) != 1:
-                self.missing[usual] = command
+                if role not in OPTIONAL:
+                    self.missing[usual] = command
                 if others:
                     names = ", ".join(other.name for other in others)
                     self.warnings.append(f"none of {names} is called {usual}: left out")
@@ -160,9 +174,9 @@ def read_run_folder(folder: Path) -> RunFolder:
     Parameters
     ----------
     folder : Path
-        With ``workspace.h5``, ``placement.h5``, ``bin.h5``, ``ranked.json`` and
-        ``validation.json``, or some of them. An artefact may have another name if it is
-        the only one of its kind.
+        With ``workspace.h5``, ``placement.h5``, ``bin.h5``, ``study.h5``,
+        ``ranked.json`` and ``validation.json``, or some of them. An artefact may have
+        another name if it is the only one of its kind.
 
     Raises
     ------
@@ -175,6 +189,7 @@ def read_run_folder(folder: Path) -> RunFolder:
     workspace = reader.artefact("workspace", read_workspace_map)
     placement = reader.artefact("placement", read_placement)
     bin_map = reader.artefact("bin", read_bin_map)
+    study = reader.artefact("study", read_study)
     ranked = _ranked_lists(reader)
     validation = _validation(reader)
     run = RunFolder(
@@ -182,6 +197,7 @@ def read_run_folder(folder: Path) -> RunFolder:
         workspace=workspace,
         placement=placement,
         bin_map=bin_map,
+        study=study,
         ranked=ranked,
         validation=validation,
         files=reader.files,

@@ -11,17 +11,18 @@ from reachmap.cell.loaded import LoadedCell
 from reachmap.maps.records import BinMap, WorkspaceMap
 from reachmap.report.answers import headline_answers
 from reachmap.report.blocks import Bullets, Code, Section, Strong
-from reachmap.report.cause_part import cause_section
-from reachmap.report.cell_part import cell_section
 from reachmap.report.folder import RunFolder, chain_warnings
-from reachmap.report.map_parts import (
+from reachmap.report.parts.cause import cause_section
+from reachmap.report.parts.cell import cell_section
+from reachmap.report.parts.maps import (
     bin_section,
     placement_section,
     workspace_section,
 )
-from reachmap.report.provenance_part import origin_section
-from reachmap.report.ranking_part import ranking_section
-from reachmap.report.validation_part import validation_section
+from reachmap.report.parts.provenance import origin_section
+from reachmap.report.parts.ranking import ranking_section
+from reachmap.report.parts.study import study_section
+from reachmap.report.parts.validation import validation_section
 
 CONTENTS = {
     "cell": "Cell",
@@ -31,6 +32,7 @@ CONTENTS = {
     "causes": "Causes",
     "ranking": "Ranking",
     "validation": "Validation",
+    "study": "Study",
     "provenance": "Provenance",
 }
 
@@ -82,7 +84,8 @@ def _environment() -> Environment:
 
 
 def _sections(run: RunFolder, cell: LoadedCell | str) -> list[Section]:
-    sections = [cell_section(cell, run.latest)]
+    latest = run.artefacts[run.latest]
+    sections = [cell_section(cell, latest)]
     maps: dict[str, WorkspaceMap | BinMap] = {}
     if run.workspace is not None:
         maps["Workspace"] = run.workspace
@@ -99,9 +102,11 @@ def _sections(run: RunFolder, cell: LoadedCell | str) -> list[Section]:
     if maps:
         sections.append(cause_section(maps))
     if run.ranked:
-        sections.append(ranking_section(run.ranked, run.latest))
+        sections.append(ranking_section(run.ranked, latest))
     if run.validation is not None:
         sections.append(validation_section(run.validation))
+    if run.study is not None:
+        sections.append(study_section(run.study))
     sections.append(origin_section(run))
     return sections
 
@@ -111,6 +116,7 @@ def _missing(run: RunFolder) -> list[Bullets]:
     items: list[tuple[object, ...]] = [
         (Strong(name), " is not in this folder; create it with ", Code(how))
         for name, how in run.missing.items()
+        if not run.is_study_alone
     ]
     items += [(warning,) for warning in [*run.warnings, *chain_warnings(run)]]
     return [Bullets(tuple(items))] if items else []

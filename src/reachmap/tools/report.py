@@ -18,8 +18,9 @@ def report(folder: str | Path, *, output: str | Path, overwrite: bool = False) -
     Parameters
     ----------
     folder : Path
-        With ``workspace.h5``, ``placement.h5``, ``bin.h5``, ``ranked.json`` and
-        ``validation.json``, as far as they exist; the page says what is missing.
+        With ``workspace.h5``, ``placement.h5``, ``bin.h5``, ``study.h5``,
+        ``ranked.json`` and ``validation.json``, as far as they exist; the page says
+        what is missing.
     output : Path
         Such as ``report.html``.
     overwrite : bool
@@ -48,8 +49,8 @@ def report(folder: str | Path, *, output: str | Path, overwrite: bool = False) -
 
 def _cell(run: RunFolder) -> LoadedCell | str:
     """Cell of the run, or why it cannot be loaded; the report is made anyway."""
-    role, record = list(run.artefacts.items())[-1]
+    role = run.latest
     try:
-        return cell_of_artefact(record.provenance, run.files[role])
+        return cell_of_artefact(run.artefacts[role].provenance, run.files[role])
     except CellError as error:
         return error.lines[0]

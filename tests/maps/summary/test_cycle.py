@@ -17,8 +17,8 @@ from reachmap.plots.bin_map import draw_cycle
 from reachmap.plots.causes import draw_causes
 from reachmap.plots.curves.timeline import draw_timeline
 from reachmap.report.answers import headline_answers
-from reachmap.report.cycle_part import cycle_blocks
 from reachmap.report.folder import RunFolder
+from reachmap.report.parts.cycle import cycle_blocks
 from tests.support.cycle_maps import WAITS_S, with_cycles
 from tests.support.synthetic_maps import synthetic_bin_map
 

@@ -8,7 +8,7 @@ from reachmap.cell.loaded import LoadedCell
 from reachmap.cell.model.shapes import shape_text
 from reachmap.core.collision.solids import SolidCell
 from reachmap.errors import ReachmapError
-from reachmap.maps.format.registry import Artefact
+from reachmap.maps.format.registry import Artefact, Result
 from reachmap.plots.cell.cell_view import draw_cell
 from reachmap.report.blocks import (
     Block,
@@ -26,7 +26,7 @@ from reachmap.report.numbers import count, number, signed
 TITLE = "The cell"
 
 
-def cell_section(loaded: LoadedCell | str, record: Artefact) -> Section:
+def cell_section(loaded: LoadedCell | str, record: Artefact | Result) -> Section:
     """Describe and draw a cell.
 
     Parameters
@@ -50,7 +50,7 @@ def cell_section(loaded: LoadedCell | str, record: Artefact) -> Section:
     )
 
 
-def _picture(loaded: LoadedCell, record: Artefact) -> Block:
+def _picture(loaded: LoadedCell, record: Artefact | Result) -> Block:
     try:
         cell = SolidCell.build(loaded)
     except ReachmapError as error:

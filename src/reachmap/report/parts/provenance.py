@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from reachmap.maps.bytes.to_json import flat_json
-from reachmap.maps.format.registry import Artefact, kind_of
+from reachmap.maps.format.registry import Artefact, Result, kind_of
 from reachmap.report.blocks import (
     Code,
     Heading,
@@ -40,7 +40,7 @@ def origin_section(run: RunFolder) -> Section:
     )
 
 
-def _facts(record: Artefact) -> Table | None:
+def _facts(record: Artefact | Result) -> Table | None:
     stamp, kept, run = record.stamp, record.provenance, record.run
     return facts(
         [

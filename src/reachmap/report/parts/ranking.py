@@ -9,7 +9,7 @@ import numpy as np
 
 from reachmap._typing import FloatArray
 from reachmap.maps.cycle.seconds import TO_GRASP
-from reachmap.maps.format.registry import Artefact
+from reachmap.maps.format.registry import Artefact, Result
 from reachmap.plots.ranking import MAX_GROUPS, CostGroup, ranking_chart, term_label
 from reachmap.ranking.answers.ranked_list import QUADRANT_ORDER, TERM_NAMES
 from reachmap.ranking.lookup.table import TERMS
@@ -37,7 +37,7 @@ TOP = 10
 
 
 def ranking_section(
-    documents: Sequence[Mapping[str, Any]], record: Artefact
+    documents: Sequence[Mapping[str, Any]], record: Artefact | Result
 ) -> Section:
     """First grasps of each list, and what ranking them saved.
 
