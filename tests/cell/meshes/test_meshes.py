@@ -422,3 +422,15 @@ def test_mutated_meshes_crash_nothing(count: int) -> None:
         if NO_SIZE_M < float(sides(mesh).max()) <= MAX_LENGTH_M:  # as the loader asks
             use(mesh)
     assert 0 < read < count
+
+
+def test_a_mesh_is_read_once_and_changed_by_nobody() -> None:
+    """The same bytes are the same mesh; its numbers are not to be written to."""
+    mesh = read_mesh(binary_stl(), ".stl")
+    assert read_mesh(binary_stl(), ".stl") is mesh
+    with pytest.raises(ValueError, match="read-only"):
+        mesh.vertices[0] = 1.0
+    assert sides(mesh.scaled(2.0)) == pytest.approx(2.0 * sides(mesh))
+    for _ in range(2):
+        with pytest.raises(MeshError):
+            read_mesh(b"solid", ".stl")

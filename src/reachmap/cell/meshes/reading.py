@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Sequence
+from functools import lru_cache
 
 import numpy as np
 
@@ -20,6 +21,9 @@ from reachmap.cell.model.shapes import TriangleMesh
 
 __all__ = ["MeshError", "read_mesh"]
 
+# Meshes that are kept, and the size of their files: 64 MiB at most. Collision meshes of
+# example-robot-data are seldom larger (10 of 171).
+KEPT, KEPT_BYTES = 64, 1 << 20
 _STL_VERTEX = re.compile(rb"\bvertex\s+(\S+)\s+(\S+)\s+(\S+)", re.IGNORECASE)
 _OTHERS = {
     ".glb": "glTF", ".gltf": "glTF", ".step": "STEP", ".stp": "STEP",
@@ -48,6 +52,11 @@ def read_mesh(data: bytes, suffix: str) -> TriangleMesh:
         The file has no triangles, is truncated, names vertices that it does not have,
         or holds numbers that are not finite.
     """
+    read = _kept if len(data) <= KEPT_BYTES else _read
+    return read(data, suffix)
+
+
+def _read(data: bytes, suffix: str) -> TriangleMesh:
     readers: dict[str, Callable[[bytes], tuple[FloatArray, IntArray]]] = {
         ".stl": _stl_triangles,
         ".obj": _obj_triangles,
@@ -71,6 +80,10 @@ def read_mesh(data: bytes, suffix: str) -> TriangleMesh:
     return _checked(vertices, triangles)
 
 
+# The links of an arm are read for its size, for each scene and for pictures.
+_kept = lru_cache(maxsize=KEPT)(_read)
+
+
 def _checked(vertices: FloatArray, triangles: IntArray) -> TriangleMesh:
     """Mesh of the vertices in use, each once."""
     if not len(triangles):
@@ -88,7 +101,10 @@ def _checked(vertices: FloatArray, triangles: IntArray) -> TriangleMesh:
     if len(corners) < 3:
         raise MeshError("the mesh has no size: its vertices coincide")
     triangles = same.reshape(-1)[triangles].reshape(-1, 3)
-    return TriangleMesh(vertices=corners, triangles=triangles.astype(np.int64))
+    mesh = TriangleMesh(vertices=corners, triangles=triangles.astype(np.int64))
+    for numbers in (mesh.vertices, mesh.triangles):
+        numbers.flags.writeable = False  # others may hold the same mesh
+    return mesh
 
 
 def _stl_triangles(data: bytes) -> tuple[FloatArray, IntArray]:
