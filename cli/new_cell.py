@@ -23,7 +23,9 @@ def _pairs(
     for text in values:
         name, equals, value = text.partition("=")
         name = name.removesuffix(":")
-        if not equals or not name:
+        # Of a package both are names; an argument may be empty.
+        is_package = parameter.name == "packages"
+        if not equals or not name or (is_package and ("/" in name or not value)):
             usual = "NAME:=VALUE" if parameter.param_type_name == "argument" else None
             raise click.BadParameter(
                 f"{text!r} is not {usual or parameter.metavar}", ctx, parameter

@@ -195,6 +195,8 @@ def test_xacro_arguments_stay_in_the_cell(
         (("name:=a", "name:=b"), "'name' is given twice"),
         (("name",), "'name' is not NAME:=VALUE"),
         (("--package", "x"), "'x' is not NAME=FOLDER"),
+        (("--package", "x="), "'x=' is not NAME=FOLDER"),
+        (("--package", "x/y=z"), "'x/y=z' is not NAME=FOLDER"),
         (("name:=a", "--package", "x=none"), "--package x=none: no such folder"),
         (("name:=a", "--moveit-config", "none"), "none: no such folder"),
     ],

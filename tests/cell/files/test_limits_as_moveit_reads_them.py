@@ -62,6 +62,26 @@ def test_soft_limits_without_a_range_are_named_and_not_used(tmp_path: Path) -> N
     assert ends(RobotModel.from_cell(loaded)) == (-3.0, 3.0)
 
 
+@pytest.mark.parametrize(
+    ("more", "warning"),
+    [
+        (SOFT.format('soft_lower_limit="-1"'), "no soft_upper_limit, which MoveIt"),
+        (SOFT.format('soft_upper_limit="1"'), "no soft_lower_limit, which MoveIt"),
+        ('<limit lower="-170" upper="170" velocity="2"/>', "in radians (got 170)"),
+        ('<limit lower="-15.7" upper="15.7" velocity="2"/>', ""),
+        ('<limit lower="-1e16" upper="1e16" velocity="2"/>', ""),
+    ],
+)
+def test_limits_that_others_take_differently_are_named(
+    tmp_path: Path, more: str, warning: str
+) -> None:
+    """Soft limits with one end, and degrees where radians belong."""
+    urdf = robot(link("base"), link("l1", BOX), joint("j1", "base", "l1", more=more))
+    warnings = [w for w in load(tmp_path, urdf, "l1", ["j1"]).warnings if "j1" in w]
+    assert len(warnings) == bool(warning), warnings
+    assert not warning or warning in warnings[0]
+
+
 def test_infinite_limits_are_none(tmp_path: Path) -> None:
     """A turning joint then turns without end, a slide has to be given its ends."""
     endless = '<limit lower="-inf" upper="INF" velocity="2" effort="inf"/>'

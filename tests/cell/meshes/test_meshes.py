@@ -98,6 +98,8 @@ def test_sizes_agree_with_coal(link: str) -> None:
     ("name", "data", "message"),
     [
         ("a.stl", b"", "truncated"),
+        ("a.STL", b"version https://git-lfs.github.com/spec/v1\noid", "git lfs pull"),
+        ("a.dae", b"version https://git-lfs.github.com/spec/v1\noid", "git lfs pull"),
         ("a.stl", b"x" + binary_stl()[1:-1], "truncated"),
         ("a.stl", binary_stl()[:-1], "truncated"),
         ("a.stl", b"solid x\nendsolid x\n", "no triangles"),

@@ -270,8 +270,15 @@ def _bounds(
     )  # fmt: skip
     if low is not None and high is not None and low > high:
         faults.append(f"joint {name!r}: limit {low:g} is above {high:g}")
+    widest_rad = max(abs(low or 0.0), abs(high or 0.0))
+    # More than any wrist turns (900 degrees), and less than some say for no limit.
+    if element.get("type") == "revolute" and 30.0 < widest_rad < 1e4:
+        notes.append(f"joint {name!r}: limits are in radians (got {widest_rad:g})")
     soft_low = _number(soft, "soft_lower_limit", name, faults)
     soft_high = _number(soft, "soft_upper_limit", name, faults)
+    if (soft_low is None) != (soft_high is None):
+        end = "lower" if soft_low is None else "upper"
+        notes.append(f"joint {name!r}: no soft_{end}_limit, which MoveIt takes for 0")
     lows = [value for value in (low, soft_low) if value is not None]
     highs = [value for value in (high, soft_high) if value is not None]
     tight = max(lows, default=None), min(highs, default=None)

@@ -1,7 +1,7 @@
 """XML as found in robot descriptions, which do not always follow the standard.
 
-Read as ROS reads it: a byte order mark or blank lines before the declaration, encodings
-other than UTF-8 where the declaration names them, prefixes that nobody bound
+Read as ROS reads it: a byte order mark, blanks or comments before the declaration,
+encodings other than UTF-8 where the declaration names them, prefixes that nobody bound
 (``<sensor:camera>``), and document types. Entities are refused.
 """
 
@@ -22,9 +22,8 @@ _BOMS = (
     (b"\xff\xfe", "utf-16-le"),
     (b"\xfe\xff", "utf-16-be"),
 )
-_ENCODING = re.compile(
-    rb"""^\s*<\?xml[^>]*?\sencoding\s*=\s*["']([A-Za-z0-9._-]+)["']"""
-)
+_ENCODING = re.compile(rb"""<\?xml[^>]*?\sencoding\s*=\s*["']([A-Za-z0-9._-]+)["']""")
+_BLANK = re.compile(rb"\s*")
 _DECLARED = re.compile(r"""^(<\?xml[^>]*?)\sencoding\s*=\s*["'][^"']*["']""")
 
 
@@ -40,7 +39,8 @@ def read_xml(path: Path, *, limit: int) -> str:
     start, encoding = next(
         ((len(bom), name) for bom, name in _BOMS if data.startswith(bom)), (0, "")
     )
-    declared = _ENCODING.match(data)
+    start = _declaration(data, start)
+    declared = _ENCODING.match(data, start)
     encoding = encoding or (declared[1].decode() if declared else "utf-8")
     try:
         text = data[start:].decode(encoding)
@@ -57,6 +57,18 @@ def read_xml(path: Path, *, limit: int) -> str:
     if encoding.lower() not in ("utf-8", "us-ascii", "ascii"):
         text = _DECLARED.sub(r"\1", text)
     return _without_document_type(text) if "<!DOCTYPE" in text else text
+
+
+def _declaration(data: bytes, start: int) -> int:
+    """Where the declaration begins, after blanks and comments; else ``start``."""
+    place = start
+    while (blank := _BLANK.match(data, place)) is not None:
+        place = blank.end()
+        end = data.find(b"-->", place) if data.startswith(b"<!--", place) else -1
+        if end < 0:
+            break
+        place = end + len(b"-->")
+    return place if data.startswith(b"<?xml", place) else start
 
 
 def parse_xml(text: str, label: str) -> ElementTree.Element:

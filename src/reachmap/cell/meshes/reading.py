@@ -69,6 +69,8 @@ def _read(data: bytes, suffix: str) -> TriangleMesh:
         known = f"{kind} meshes are not read" if kind else f"unknown format {suffix!r}"
         wanted = ", ".join(readers)
         raise MeshError(f"{known}; export it as one of {wanted}")
+    if data.startswith(b"version https://git-lfs"):
+        raise MeshError("a pointer of Git LFS, not the mesh: `git lfs pull` fetches it")
     try:
         # What overflows is found among the vertices that are not finite.
         with np.errstate(all="ignore"):
