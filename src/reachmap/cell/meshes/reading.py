@@ -19,7 +19,7 @@ from reachmap.cell.meshes.ply import ply_triangles
 from reachmap.cell.meshes.polygons import MeshError, fans
 from reachmap.cell.model.shapes import TriangleMesh
 
-__all__ = ["MeshError", "read_mesh"]
+__all__ = ["KEPT", "KEPT_BYTES", "MeshError", "read_mesh"]
 
 # Meshes that are kept, and the size of their files: 64 MiB at most. Collision meshes of
 # example-robot-data are seldom larger (10 of 171).

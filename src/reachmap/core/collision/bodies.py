@@ -20,7 +20,7 @@ from reachmap.cell.files.collisions import LinkShape
 from reachmap.cell.files.files import body_key
 from reachmap.cell.files.srdf import parse_srdf
 from reachmap.cell.files.urdf import UrdfDescription
-from reachmap.cell.meshes.reading import MeshError, read_mesh
+from reachmap.cell.meshes.reading import KEPT, KEPT_BYTES, MeshError, read_mesh
 from reachmap.cell.model.bin_parts import BinPart, bin_parts
 from reachmap.cell.model.bodies import BinSpec
 from reachmap.cell.model.fields import Shape
@@ -248,19 +248,23 @@ def _read_mesh(loaded: LoadedCell, key: str, owner: str, scale: Any) -> Solid:
     path = loaded.mesh_paths[key]
     factors = tuple(np.broadcast_to(np.asarray(scale, float), 3).tolist())
     try:
-        return _scaled_mesh(path.read_bytes(), path.suffix, factors)
+        data = path.read_bytes()
+        scaled = _kept_mesh if len(data) <= KEPT_BYTES else _scaled_mesh
+        return scaled(data, path.suffix, factors)
     except (OSError, MeshError) as error:
         raise SceneError(
             f"{owner}: {path.name} cannot be read as a mesh ({error})"
         ) from error
 
 
-@lru_cache(maxsize=64)
 def _scaled_mesh(
     data: bytes, suffix: str, factors: tuple[float, float, float]
 ) -> TriangleMesh:
-    """The same object for the same file: scenes of one cell share their meshes."""
     return read_mesh(data, suffix).scaled(factors)
+
+
+# The same object for the same file: scenes of one cell share their meshes.
+_kept_mesh = lru_cache(maxsize=KEPT)(_scaled_mesh)
 
 
 class _Builder:
