@@ -182,15 +182,17 @@ class Memo:
         """Result of another cell that is also valid here, or None."""
         entries = self._known.setdefault(key, [])
         self._known.move_to_end(key)
-        # Queries that are repeated here belong to no computation.
+        # Queries that are repeated here belong to no computation, and to no budget.
         outer, Trace.current = Trace.current, None
+        checker = within.scene.checker
+        checks = checker.checks
         try:
             for known in reversed(entries):
                 changed = known.surroundings.changed(within.surroundings)
                 if known.trace.repeats_in(within.scene, changed):
                     return known
         finally:
-            Trace.current = outer
+            Trace.current, checker.checks = outer, checks
         return None
 
     def _evict_oldest(self) -> None:
