@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from functools import lru_cache
 
 import numpy as np
 import pytest
@@ -58,10 +59,16 @@ def pose_text(T):
     return json.dumps({"xyz": T[:3, 3].tolist(), "quaternion_wxyz": quaternion})
 
 
+@lru_cache
+def as_designed(cell, overrides):
+    """A cell and its robot, which are the same in every cell that is off."""
+    loaded = read_cell(cell, overrides)
+    return loaded, RobotModel.from_cell(loaded)
+
+
 def perturbed(cell, overrides, T_base_bin, T_mount_tool, tool):
     """A cell that is off, written down as a user would, with nothing to spare."""
-    loaded = read_cell(cell, overrides)
-    robot = RobotModel.from_cell(loaded)
+    loaded, robot = as_designed(cell, overrides)
     _, T_joint_mount = robot.frame_placement(loaded.cell.robot.tcp.parent)
     changes = [f"bin.pose={pose_text(T_base_bin)}"]
     for body in loaded.cell.bodies:
