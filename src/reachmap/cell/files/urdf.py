@@ -277,8 +277,8 @@ def _bounds(
     soft_low = _number(soft, "soft_lower_limit", name, faults)
     soft_high = _number(soft, "soft_upper_limit", name, faults)
     if (soft_low is None) != (soft_high is None):
-        end = "lower" if soft_low is None else "upper"
-        notes.append(f"joint {name!r}: no soft_{end}_limit, which MoveIt takes for 0")
+        end = "soft_lower_limit" if soft_low is None else "soft_upper_limit"
+        notes.append(f"joint {name!r}: no {end}, which MoveIt takes for 0")
     lows = [value for value in (low, soft_low) if value is not None]
     highs = [value for value in (high, soft_high) if value is not None]
     tight = max(lows, default=None), min(highs, default=None)

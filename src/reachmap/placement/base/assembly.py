@@ -198,7 +198,10 @@ def _nowhere(searches: Sequence[BaseSearch]) -> str:
         {r for s in searches for r in s.outcome.decision.table.reasons() if r}
     )
     why = f" ({'; '.join(reasons[:4])})" if reasons else ""
-    return f"{searches[0].loaded.source}: the arm reaches the bin from nowhere{why}"
+    return (
+        f"{searches[0].loaded.source}: the arm reaches the bin from nowhere in the "
+        f"region that was searched{why}"
+    )
 
 
 def _final_cell(search: BaseSearch) -> LoadedCell:
