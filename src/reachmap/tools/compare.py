@@ -82,8 +82,10 @@ class MapComparison:
     def require(self, points: float) -> None:
         """Raise GateFailedError if the change is below a number of points."""
         if self.result.change < points:
+            before, after = self.names
             raise GateFailedError(
-                f"{self.headline}: the change is below {points:+g} points"
+                f"{after} against {before}: {self.headline}: "
+                f"the change is below {points:+g} points"
             )
 
 
@@ -122,9 +124,12 @@ def compare(
             f"{before} is a {kinds[0]}, {after} a {kinds[1]}; "
             "compare takes two maps of the same kind"
         )
-    result = compare_maps(
-        a, b, frame=frame, tolerance_m=tolerance_m, tolerance_deg=tolerance_deg
-    )
+    try:
+        result = compare_maps(
+            a, b, frame=frame, tolerance_m=tolerance_m, tolerance_deg=tolerance_deg
+        )
+    except SettingsError as error:
+        raise SettingsError(f"{before} and {after}: {error}") from None
     return MapComparison(paths=(before, after), before=a, after=b, result=result)
 
 

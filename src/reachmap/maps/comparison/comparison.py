@@ -223,7 +223,7 @@ def _nothing_common(
     tolerance_deg: float,
 ) -> str:
     text = (
-        "the two maps have no test frame in common "
+        "the maps have no test frame in common "
         f"(within {tolerance_m * 1000:g} mm and {tolerance_deg:g} degrees)"
     )
     if isinstance(record, BinMap) and frame == "robot_base":
