@@ -72,7 +72,7 @@ def test_the_cell_may_be_changed(folder):
         (["bin.h5", "toy.json", "-o", "toy.json"], "would replace toy.json"),
         (["bin.h5", "toy.json", "--chart", "a.pdf"], "a.pdf: expected a name in .png"),
         (["bin.h5", "toy.json", "-o", "there.json"], "there.json: exists already"),
-        (["bin.h5", "toy.json", "-o", "a.png", "--chart", "a.png"], "need two files"),
+        (["bin.h5", "toy.json", "-o", "also", "--chart", "a.png"], "need two files"),
         (["bin.h5", "toy.json", "--set", "planner.nome=RRT"], "planner.nome"),
         (["bin.h5", "toy.json", "--executor", "cloud"], "executor 'cloud'"),
     ],
@@ -81,6 +81,8 @@ def test_refusals_say_what_is_wrong(folder, arguments, message):
     """Exit code 2, one line each, before anything is planned."""
     (folder / "none.json").write_text(json.dumps(toy_grasps(np.zeros((0, 3)))))
     (folder / "there.json").write_text("{}")
+    if not (folder / "also").is_symlink():
+        (folder / "also").symlink_to("a.png")
     result = run(*arguments)
     assert result.exit_code == 2
     assert result.stdout == ""
