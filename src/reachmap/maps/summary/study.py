@@ -175,6 +175,8 @@ def sentence(study: Study, row: int, objective: int) -> str:
     half = f"{max(middle - low, high - middle):.{digits}f}"
     if study.significant[row, objective]:
         return f"{what}{change} ± {half} {word}"
+    if not low <= 0.0 <= high:
+        return f"{what}{change} ± {half} {word}, not significant across the study"
     return f"{what}{change} {word}, not distinguishable from {half} of noise"
 
 
