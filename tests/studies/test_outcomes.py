@@ -11,6 +11,7 @@ from reachmap.maps.study.record import OBJECTIVES
 from reachmap.maps.summary.clearance import clearance_shares
 from reachmap.maps.summary.emptying import emptying_of
 from reachmap.runtime.options import RunOptions
+from reachmap.studies.assembly import best_rows
 from reachmap.studies.outcomes import compare_outcomes, of_bin
 from reachmap.tools.bin_scan import bin_scan
 from reachmap.tools.study import study
@@ -60,3 +61,17 @@ def test_what_a_cell_does_not_have_is_refused(name, tmp_path):
     with pytest.raises(SettingsError, match=f"{name}: "):
         study("planar-toy", tmp_path / "s.h5", vary=["seed=1,2"], objectives=[name])
     assert not [*tmp_path.iterdir()]
+
+
+@pytest.mark.parametrize(
+    ("costs", "base", "wanted"),
+    [
+        ([3.0, 1.0, 1.0, 2.0], 2, (2, 1)),
+        ([3.0, 1.0, 1.0, 2.0], 0, (1, 2)),
+        ([np.nan, 2.0], 0, (1, -1)),
+        ([np.nan, np.nan], 1, (-1, -1)),
+    ],
+)
+def test_of_equal_variants_the_base_is_the_best(costs, base, wanted):
+    """A change that gains nothing is not proposed; what failed is never chosen."""
+    assert best_rows(np.array(costs), base) == wanted

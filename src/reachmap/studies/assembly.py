@@ -77,7 +77,9 @@ def assemble(
             for row in values["value"].tolist()
         ]
     )
-    best, runner_up = _best(names[0], values["value"][:, 0], feasible)
+    sign = 1.0 if names[0] in LOWER_IS_BETTER else -1.0
+    costs = np.where(feasible, sign * values["value"][:, 0], np.nan)
+    best, runner_up = best_rows(costs, document["base"])
     return Study(
         design=document["design"],
         bin_mode=document["bin_mode"],
@@ -196,12 +198,15 @@ def _changes(
     return {**arrays, "significant": significant}
 
 
-def _best(name: str, value: FloatArray, feasible: BoolArray) -> tuple[int, int]:
-    """The best of the feasible variants and the one after it, -1 for none."""
-    rows = np.flatnonzero(feasible & ~np.isnan(value))
-    sign = 1.0 if name in LOWER_IS_BETTER else -1.0
-    order = [*rows[np.argsort(sign * value[rows], kind="stable")].tolist(), -1, -1]
-    return order[0], order[1]
+def best_rows(costs: FloatArray, base: int) -> tuple[int, int]:
+    """The cheapest variant and the one after it, -1 for none; NaN cannot be chosen.
+
+    Of equal ones the base comes first: what gains nothing is no reason to change.
+    """
+    rows = np.flatnonzero(~np.isnan(costs))
+    order = rows[np.lexsort((rows, rows != base, costs[rows]))]
+    best, runner_up = [*order.tolist(), -1, -1][:2]
+    return best, runner_up
 
 
 KIND = Kind(name="study", blank=blank, assemble=assemble, write=write_study)
