@@ -11,11 +11,10 @@ import numpy as np
 from reachmap._typing import FloatArray
 from reachmap.core.collision.bin_fit import BinFit
 from reachmap.errors import SceneError
-from reachmap.geometry import inverse_transform
 from reachmap.maps.records import Status
 from reachmap.maps.summary.unreachable import most_likely_cause
 from reachmap.placement.mapped.candidates import Candidate, CandidateTable
-from reachmap.placement.mapped.exact import PlacedScene, Pose
+from reachmap.placement.mapped.exact import PlacedScene, Pose, pose_of_bin
 from reachmap.placement.mapped.imaging import UNSEEN
 from reachmap.placement.mapped.sample import THIN, sample_of
 from reachmap.placement.margins import MARGIN_POSES, margins
@@ -131,8 +130,7 @@ def paper_pose(problem: PlacementProblem) -> Pose | None:
     the bin cannot stand there like that, turned by 90 degrees.
     """
     workspace, cell = problem.workspace, problem.loaded.cell
-    T_level_bin = inverse_transform(cell.T_base_level()) @ cell.T_base_bin()
-    yaw = float(np.arctan2(T_level_bin[1, 0], T_level_bin[0, 0]))
+    yaw = pose_of_bin(cell)[3]
     found: list[Pose] = []
 
     def is_feasible(point: LatticePoint) -> bool:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from itertools import chain
 
 import numpy as np
 
@@ -10,8 +11,8 @@ from reachmap.cell.bins.support import SLACK_M, TOUCH_M, TopFace, footprint_of_b
 from reachmap.cell.model.cell import Cell
 from reachmap.core.collision.bin_fit import BinFit
 from reachmap.errors import SettingsError
-from reachmap.geometry import inverse_transform, yaw_transform
-from reachmap.placement.mapped.exact import Pose, bin_at
+from reachmap.geometry import yaw_transform
+from reachmap.placement.mapped.exact import Pose, bin_at, pose_of_bin
 from reachmap.placement.predicted.region import Region
 
 # A face is tried on a grid this wide [m] and at these angles until a bin fits.
@@ -62,9 +63,7 @@ def natural_poses(cell: Cell, region: Region, faces: Sequence[TopFace]) -> list[
     faces : sequence of TopFace
         In the level frame.
     """
-    T_level_bin = inverse_transform(cell.T_base_level()) @ cell.T_base_bin()
-    x, y, z = T_level_bin[:3, 3].tolist()
-    yaw = float(np.arctan2(T_level_bin[1, 0], T_level_bin[0, 0]))
+    x, y, z, yaw = pose_of_bin(cell)
     heights = [face.z + cell.bin.bottom_m for face in faces]
     z = next((height for height in heights if abs(height - z) <= TOUCH_M), z)
     found = [(x, y, z, yaw)]
@@ -79,28 +78,28 @@ def natural_poses(cell: Cell, region: Region, faces: Sequence[TopFace]) -> list[
 
 def has_room(cell: Cell, region: Region, face: TopFace, fit: BinFit) -> bool:
     """Whether a bin can stand somewhere on a face, within the region."""
-    if any(
-        face.overhang_m(footprint_of_bin(cell.bin, yaw_transform(*pose))) <= SLACK_M
-        and not region.outside(np.array(pose))
-        and fit.contact(bin_at(cell, pose)) is None
+    natural = (
+        pose
         for pose in natural_poses(cell, region, (face,))
-    ):
-        return True
+        if not region.outside(np.array(pose))
+    )
+    return any(
+        face.overhang_m(footprint_of_bin(cell.bin, yaw_transform(*pose))) <= SLACK_M
+        and fit.contact(bin_at(cell, pose)) is None
+        for pose in chain(natural, _grid_on(face, region, face.z + cell.bin.bottom_m))
+    )
+
+
+def _grid_on(face: TopFace, region: Region, z: float) -> Iterator[Pose]:
+    """Poses at a height all over a face, as far as the region goes."""
     low = np.maximum(region.low[:2], face.polygon.min(axis=0))
     high = np.minimum(region.high[:2], face.polygon.max(axis=0))
     if (low > high).any():
-        return False
-    z = face.z + cell.bin.bottom_m
+        return
     x, y = (
         np.linspace(a, b, int(np.ceil((b - a) / STEP_M)) + 1)
         for a, b in zip(low, high, strict=True)
     )
     for yaw in np.linspace(region.low[3], region.high[3], YAWS, endpoint=False):
         for at in np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2):
-            pose = (float(at[0]), float(at[1]), z, float(yaw))
-            corners = footprint_of_bin(cell.bin, yaw_transform(*pose))
-            if face.overhang_m(corners) > SLACK_M:
-                continue
-            if fit.contact(bin_at(cell, pose)) is None:
-                return True
-    return False
+            yield float(at[0]), float(at[1]), z, float(yaw)

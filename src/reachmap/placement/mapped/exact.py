@@ -20,7 +20,7 @@ from reachmap.core.planning.approach import StraightApproach
 from reachmap.core.planning.connection import Connection, connect
 from reachmap.core.planning.roadmap import Goals
 from reachmap.core.scene import Scene
-from reachmap.geometry import axis_vector, yaw_transform
+from reachmap.geometry import axis_vector, inverse_transform, yaw_transform
 from reachmap.placement.mapped.sample import Sample, rolls_of
 from reachmap.sampling.frames import approach_distance_m
 
@@ -73,6 +73,13 @@ def bin_at(cell: Cell, pose: Pose) -> FloatArray:
         In the cell's level frame, see :meth:`Cell.T_base_level`.
     """
     return np.asarray(cell.T_base_level() @ yaw_transform(*pose))
+
+
+def pose_of_bin(cell: Cell) -> Pose:
+    """Where a cell has its bin, as a pose of :func:`bin_at`."""
+    T_level_bin = inverse_transform(cell.T_base_level()) @ cell.T_base_bin()
+    x, y, z = T_level_bin[:3, 3].tolist()
+    return x, y, z, float(np.arctan2(T_level_bin[1, 0], T_level_bin[0, 0]))
 
 
 class Placing(Protocol):

@@ -16,7 +16,6 @@ from reachmap.placement.predicted.region import Region
 # place, a coarser one misses narrow ones.
 STEPS_PER_SQUARE = 4
 YAW_STEP_DEG = 15.0
-YAWS_PER_LEVEL = 12
 
 
 def pose_grid(

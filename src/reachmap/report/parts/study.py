@@ -76,7 +76,7 @@ def _words(summary: StudySummary) -> list[Block]:
         (summary.failed, "failed"),
         (summary.left_out, "left out after a coarse map"),
     )
-    rest = "".join(f", {number} {word}" for number, word in outcomes if number)
+    rest = "".join(f", {many} {word}" for many, word in outcomes if many)
     required = ""
     if summary.requirements:
         required = f" Required: {', '.join(summary.requirements)}."
