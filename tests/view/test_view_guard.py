@@ -11,6 +11,7 @@ import pytest
 
 pytest.importorskip("viser")
 
+import viser
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
@@ -18,7 +19,8 @@ from reachmap.errors import OutputError
 from reachmap.view.engine import start_server, stop_server
 from reachmap.view.guard import Guard, is_loopback
 
-VISER = ["viser-v1.1.1"]
+# The subprotocol that a page of this version of viser asks for.
+VISER = [f"viser-v{viser.__version__}"]
 
 
 @pytest.fixture(scope="module")
