@@ -31,9 +31,9 @@ from reachmap.plots.albums import (
 from reachmap.plots.parts.files import Picture, Table, write_all
 from reachmap.plots.parts.levels import QUANTITIES, Quantity
 from reachmap.plots.parts.style import Format, PercentMap
+from reachmap.ranking.lookup.costs import columns_of
 from reachmap.ranking.lookup.settings import RankSettings
 from reachmap.ranking.lookup.table import table_from_bin_map
-from reachmap.ranking.terms.columns import columns_of
 
 NO_LEVELS = ("bin_map", "bin_placement", "base_placement", "study", "robustness")
 

@@ -22,9 +22,9 @@ from reachmap.ranking.answers.pipeline import pose_from_numbers, rank_list
 from reachmap.ranking.answers.ranked_list import RankedList
 from reachmap.ranking.lists.reading import STDIN
 from reachmap.ranking.lookup.calibration import calibration_beside
+from reachmap.ranking.lookup.costs import cycle_of
 from reachmap.ranking.lookup.ranker import Ranker
 from reachmap.ranking.lookup.settings import CostBasis, RankSettings
-from reachmap.ranking.terms.columns import cycle_of
 from reachmap.runtime.options import IN_PROCESS, RunOptions
 from reachmap.runtime.progress import Progress
 from reachmap.sampling.frames import approach_distance_m

@@ -19,11 +19,11 @@ from reachmap.errors import OutputError, SettingsError
 from reachmap.maps.bytes.publish import publish
 from reachmap.ranking.lists.arrays import GraspList
 from reachmap.ranking.lists.reading import STDIN
+from reachmap.ranking.lookup.costs import LIKENESS
 from reachmap.ranking.lookup.matching import Queries
 from reachmap.ranking.lookup.order import INVALID, OUTSIDE_MAP, Ranking, status_name
 from reachmap.ranking.lookup.settings import MARGINS, RankSettings
 from reachmap.ranking.lookup.table import TERMS
-from reachmap.ranking.terms.columns import LIKENESS
 
 TERM_NAMES = (*TERMS, LIKENESS, *MARGINS)
 

@@ -18,8 +18,12 @@ from reachmap.maps.records import BinMap, Stamp
 from reachmap.ranking.lookup.bin_room import BinRoom
 from reachmap.ranking.lookup.calibration import Calibration, usual_calibration
 from reachmap.ranking.lookup.costs import (
+    LIKENESS,
+    Columns,
     beyond_points,
     blended_terms,
+    columns_of,
+    cycle_of,
     likeness_terms,
     outside_map,
     unlike_map,
@@ -55,8 +59,7 @@ from reachmap.ranking.lookup.settings import (
 from reachmap.ranking.lookup.surroundings import Surroundings
 from reachmap.ranking.lookup.table import GraspTable, table_from_bin_map
 from reachmap.ranking.lookup.verdict import RefinedVerdicts
-from reachmap.ranking.terms.columns import LIKENESS, Columns, columns_of, cycle_of
-from reachmap.ranking.terms.seconds import FAILURE
+from reachmap.ranking.terms import FAILURE
 
 
 class Ranker:

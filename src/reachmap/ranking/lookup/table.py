@@ -20,8 +20,12 @@ from reachmap.maps.bytes.hashing import canonical_array
 from reachmap.maps.parts import freeze
 from reachmap.maps.records import BinMap, Status
 from reachmap.ranking.lookup.settings import QUANTILE, CostBasis
-from reachmap.ranking.terms.margins import margin_terms, margin_values
-from reachmap.ranking.terms.seconds import CycleSeconds, cycle_seconds
+from reachmap.ranking.terms import (
+    CycleSeconds,
+    cycle_seconds,
+    margin_terms,
+    margin_values,
+)
 
 TERMS: Final = ("path_length", "planning_time", "execution_time")
 # Rounding of directions that are meant to be equal.

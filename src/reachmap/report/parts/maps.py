@@ -28,9 +28,9 @@ from reachmap.plots.overview import draw_overview
 from reachmap.plots.parts.levels import level_names
 from reachmap.plots.parts.stack import stack_of
 from reachmap.plots.placement import draw_placement
+from reachmap.ranking.lookup.costs import columns_of
 from reachmap.ranking.lookup.settings import RankSettings
 from reachmap.ranking.lookup.table import table_from_bin_map
-from reachmap.ranking.terms.columns import columns_of
 from reachmap.report.blocks import (
     Blocks,
     Heading,

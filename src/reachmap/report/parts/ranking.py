@@ -13,7 +13,7 @@ from reachmap.maps.format.registry import Artefact, Result
 from reachmap.plots.ranking import MAX_GROUPS, CostGroup, ranking_chart, term_label
 from reachmap.ranking.answers.ranked_list import QUADRANT_ORDER, TERM_NAMES
 from reachmap.ranking.lookup.table import TERMS
-from reachmap.ranking.terms.seconds import FAILURE, PLANNING
+from reachmap.ranking.terms import FAILURE, PLANNING
 from reachmap.report.blocks import (
     Blocks,
     Heading,

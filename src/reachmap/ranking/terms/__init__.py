@@ -1,1 +1,0 @@
-"""The terms of a cost: of J, of margins, and of predicted seconds."""
