@@ -134,7 +134,7 @@ def grasps(data: bytes, folder: Path) -> None:
 
 def hdf5(data: bytes, folder: Path) -> None:
     """An artefact: as it is, and with a seal that fits."""
-    from reachmap.maps.bytes.integrity import seal, unseal
+    from reachmap.maps.bytes.hashing import seal, unseal
     from reachmap.maps.format.registry import read_artefact
 
     path = folder / "map.h5"

@@ -11,8 +11,7 @@ import pytest
 from reachmap.maps import BinMap, BinPlacement, PathStore, Status, WorkspaceMap
 from reachmap.maps.bytes.tree import Leaf, Tree
 from reachmap.maps.format.bin import BIN, tree_from_bin_map
-from reachmap.maps.format.checks import path_lengths
-from reachmap.maps.format.contract import check_structure
+from reachmap.maps.format.checks import check_structure, path_lengths
 from reachmap.maps.format.placement import PLACEMENT, tree_from_placement
 from reachmap.maps.format.store import check_tree
 from reachmap.maps.format.workspace import WORKSPACE, tree_from_workspace_map

@@ -21,10 +21,14 @@ from reachmap.maps import (
     write_placement,
     write_workspace_map,
 )
-from reachmap.maps.bytes import integrity, isolation
-from reachmap.maps.bytes.hashing import content_sha256, integrity_sha256
+from reachmap.maps.bytes import isolation
+from reachmap.maps.bytes.hashing import (
+    SEAL_BYTES,
+    content_sha256,
+    integrity_sha256,
+    seal,
+)
 from reachmap.maps.bytes.hdf5 import image_from_tree
-from reachmap.maps.bytes.integrity import SEAL_BYTES
 from reachmap.maps.bytes.tree import Tree
 from reachmap.maps.format import bin as bin_format
 from tests.support.synthetic_maps import (
@@ -38,7 +42,7 @@ from tests.support.synthetic_maps import (
 def _inspect_here(monkeypatch: pytest.MonkeyPatch, request: Any) -> None:
     """Files without a seal are tried out in this process, which is quicker."""
     if "elsewhere" not in request.node.name:
-        monkeypatch.setattr(isolation, "reason_against", integrity.inspect)
+        monkeypatch.setattr(isolation, "reason_against", isolation.inspect)
 
 
 @pytest.fixture
@@ -264,7 +268,7 @@ def test_forged_values_are_refused(
         value = np.full_like(np.asarray(leaf.value), value)
     tree.leaves[name] = dataclasses.replace(leaf, value=value)
     image = image_from_tree(assembled(tree))
-    path.write_bytes(image + integrity.seal(image))
+    path.write_bytes(image + seal(image))
     assert message in error_of(read_bin_map, path)
 
 

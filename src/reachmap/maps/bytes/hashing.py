@@ -1,15 +1,22 @@
-"""Checksums of an artefact: its content, its inputs, and everything in it.
+"""Checksums of an artefact: its content, its inputs, everything in it, its bytes.
 
 ``content_sha256`` covers the scientific result and is the same for the same
 inputs, seed and settings. ``integrity_sha256`` covers everything a file says, measured
 times and provenance included. Both are taken over the logical content, not over the
 bytes of the file, so that a repacked copy keeps them.
+
+The seal is a checksum of the bytes, appended to the HDF5 data. The HDF5 library trusts
+what it reads: on a file with a few flipped bits it can loop for ever. So no artefact is
+handed to it before its bytes have been compared with the seal. Readers of HDF5 ignore
+what follows the end of the file that the superblock names; a program that opens the
+file for writing cuts the seal off.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
+import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -25,6 +32,10 @@ UNHASHED_GROUPS = ("run", "provenance")
 """Groups outside ``content_sha256``; what matters of them is in ``config_sha256``."""
 
 CHECKSUMS = ("content_sha256", "integrity_sha256")
+
+_PREFIX = b"\nreachmap-seal sha256 "
+_PATTERN = re.compile(re.escape(_PREFIX) + rb"([0-9a-f]{64})\n\Z")
+SEAL_BYTES = len(_PREFIX) + 65
 
 
 def canonical_json(value: Any) -> str:
@@ -139,3 +150,24 @@ def canonical_array(array: Array) -> Array:
     positive = little + little.dtype.type(0.0)
     positive[np.isnan(positive)] = np.nan
     return np.asarray(positive)
+
+
+def seal(image: bytes) -> bytes:
+    """Make the line that is written behind an HDF5 image."""
+    return _PREFIX + hashlib.sha256(image).hexdigest().encode() + b"\n"
+
+
+def unseal(data: bytes) -> tuple[bytes, bool | None]:
+    """Split a file into its HDF5 image and the verdict of its seal.
+
+    Returns
+    -------
+    image : bytes
+    intact : bool or None
+        Whether the seal fits the image; None where there is no seal.
+    """
+    found = _PATTERN.search(data, max(0, len(data) - SEAL_BYTES))
+    if found is None:
+        return data, None
+    image = data[: found.start()]
+    return image, hashlib.sha256(image).hexdigest().encode() == found.group(1)

@@ -14,6 +14,7 @@ import os
 import pickle
 import resource
 import signal
+import subprocess
 import sys
 import threading
 import warnings
@@ -22,10 +23,15 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import Any, NoReturn, TypeVar
 
-from reachmap.maps.bytes.hdf5 import StructureError
-from reachmap.maps.bytes.integrity import reason_against
+from reachmap.maps.bytes.hdf5 import (
+    StructureError,
+    identity_from_image,
+    tree_from_image,
+)
 
 Found = TypeVar("Found")
+
+SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
 CPU_LIMIT_S = 2.0
 """Time that reading may take [s]; a map of 3 MB takes 0.1 s."""
@@ -36,6 +42,32 @@ SECONDS_PER_BYTE = 0.5e-6
 ALIGNMENT = 64
 MAX_COPIED_BYTES = 512 * 2**20
 """Images larger than this are not worth a second copy of what is in them."""
+
+# Generous for starting Python on a busy machine.
+TIME_LIMIT_S = 15.0
+
+
+def named_size(image: bytes) -> int | None:
+    """Size of an HDF5 image according to its superblock [bytes], None if odd.
+
+    A shorter image was cut off, which is cheaper to see here than by reading it.
+    """
+    if len(image) < 48:
+        return None
+    # Place of the end-of-file address, by version of the superblock.
+    start = {0: 40, 1: 44, 2: 28, 3: 28}.get(image[8])
+    return int.from_bytes(image[start : start + 8], "little") if start else None
+
+
+def is_open_for_writing(image: bytes) -> bool:
+    """Whether the superblock says that a program has the file open for writing.
+
+    A program that crashed leaves the flag behind.
+    """
+    if len(image) < 24:
+        return False
+    # Place of the consistency flags, by version of the superblock; bit 0 is writing.
+    return bool(image[11 if image[8] >= 2 else 20] & 1)
 
 
 def isolated(
@@ -147,3 +179,44 @@ def _result(answer: int) -> Any:
     if reason:
         raise StructureError(reason)
     return found
+
+
+def reason_against(image: bytes) -> str:
+    """Reason not to read an image in this process, found by another one; "" if none."""
+    limit_s = TIME_LIMIT_S + SECONDS_PER_BYTE * len(image)
+    try:
+        done = subprocess.run(
+            [sys.executable, "-m", __name__],
+            input=image,
+            capture_output=True,
+            timeout=limit_s,
+            check=False,
+        )
+    except (OSError, subprocess.TimeoutExpired):
+        return "HDF5 cannot read it"
+    if done.returncode == 0:
+        return ""
+    return done.stdout.decode(errors="replace").strip() or "HDF5 cannot read it"
+
+
+def inspect(image: bytes) -> str:
+    """Read an image in this process and report what is wrong with it, or ""."""
+    try:
+        identity = identity_from_image(image)
+        # Of a file of another program, nothing more will be read.
+        if str(identity.get("format")).startswith("reachmap."):
+            tree_from_image(image)
+    except StructureError as error:
+        return str(error)
+    return ""
+
+
+def main() -> int:
+    """Inspect the image on standard input; write what is wrong with it, if anything."""
+    reason = inspect(sys.stdin.buffer.read())
+    sys.stdout.write(reason)
+    return 1 if reason else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

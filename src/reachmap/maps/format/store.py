@@ -12,7 +12,7 @@ import numpy as np
 
 from reachmap.disk import read_up_to
 from reachmap.errors import EngineError, MapFileError, ReachmapError
-from reachmap.maps.bytes.hashing import content_sha256, integrity_sha256
+from reachmap.maps.bytes.hashing import content_sha256, integrity_sha256, seal, unseal
 from reachmap.maps.bytes.hdf5 import (
     MAX_BYTES,
     StructureError,
@@ -20,17 +20,15 @@ from reachmap.maps.bytes.hdf5 import (
     image_from_tree,
     tree_from_image,
 )
-from reachmap.maps.bytes.integrity import (
+from reachmap.maps.bytes.isolation import (
     SIGNATURE,
     is_open_for_writing,
+    isolated,
     named_size,
-    seal,
-    unseal,
 )
-from reachmap.maps.bytes.isolation import isolated
 from reachmap.maps.bytes.publish import publish
 from reachmap.maps.bytes.tree import Leaf, Tree
-from reachmap.maps.format.contract import check_ranges, check_structure
+from reachmap.maps.format.checks import check_ranges, check_structure
 from reachmap.maps.format.layout import (
     FORMAT_VERSION,
     KINDS,
