@@ -1,4 +1,4 @@
-"""The group of all subcommands: lazy, in sections, with one place for failures."""
+"""The command ``reachmap``: its subcommands, lazy, and one place for failures."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ from reachmap.cli.failures import PipeClosedError, RunState, exit_code_of
 from reachmap.cli.verbosity import (
     ARGUMENTS,
     configure_logging,
+    show_version,
     verbosity_parameters,
 )
 from reachmap.errors import SettingsError
@@ -237,3 +238,37 @@ class PipelineGroup(click.Group):
         with stop_signals():  # SIGTERM and a closed terminal end it as Ctrl-C does
             code = exit_code_of(run, state)
         sys.exit(code)
+
+
+@click.group(
+    cls=PipelineGroup,
+    name="reachmap",
+    context_settings={
+        "auto_envvar_prefix": "REACHMAP",
+        "help_option_names": ["-h", "--help"],
+        "max_content_width": 88,
+    },
+)
+@click.option(
+    "--version",
+    is_flag=True,
+    expose_value=False,
+    is_eager=True,
+    callback=show_version,
+    help="Show the version and exit; with -v, also those of the engines.",
+)
+def group() -> None:
+    """Path-reachability maps for bin-picking cells.
+
+    A robot cell goes in, maps come out, and every later question is answered from a
+    map: where the bin goes, which grasps the arm really reaches, and which to pick
+    first. Each command of the pipeline writes one file that the next one reads.
+
+    \b
+    Example:
+      reachmap workspace-scan
+      reachmap heatmap
+      reachmap place-bin
+      reachmap bin-scan
+      reachmap rank grasps.json
+    """

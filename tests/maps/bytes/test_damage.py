@@ -183,8 +183,8 @@ def test_hdf5_is_given_a_limited_time(
     path = tmp_path / "unsealed.h5"
     path.write_bytes(original[:-SEAL_BYTES])
     monkeypatch.setattr(isolation, "_can_copy", lambda: False)
-    monkeypatch.setattr(integrity, "TIME_LIMIT_S", 0.0)
-    monkeypatch.setattr(integrity, "SECONDS_PER_BYTE", 0.0)
+    monkeypatch.setattr(isolation, "TIME_LIMIT_S", 0.0)
+    monkeypatch.setattr(isolation, "SECONDS_PER_BYTE", 0.0)
     with pytest.raises(MapFileError, match="damaged, HDF5 cannot read it"):
         read(path)
 
