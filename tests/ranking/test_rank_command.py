@@ -13,7 +13,7 @@ import pytest
 from click.testing import CliRunner
 
 from reachmap.cli import group
-from reachmap.ranking.lists.importers import FORMATS
+from reachmap.ranking.lists.reading import FORMATS
 from tests.support.optional import present
 
 HEAVY = ("pinocchio", "coal", "ompl", "eaik", "matplotlib", "pydantic", "viser")

@@ -11,13 +11,3 @@ Format                    Orientation and approach        Frame, unit
 
 None of them names a frame of the cell, so the caller says which it is.
 """
-
-from __future__ import annotations
-
-from reachmap.ranking.lists.importers.detection import (
-    FORMATS,
-    NATIVE,
-    document_from_bytes,
-)
-
-__all__ = ["FORMATS", "NATIVE", "document_from_bytes"]
