@@ -8,8 +8,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from reachmap.cell.bins.carriers import write_out_carriers
-from reachmap.cell.bins.filling import write_out_fill
-from reachmap.cell.bins.names import gather_bins, write_out_bins
+from reachmap.cell.bins.shorthand import gather_bins, write_out_bins, write_out_fill
 from reachmap.cell.bins.support import with_bins_on_supports
 from reachmap.cell.files.files import compare_hashes, read_files, stored_files
 from reachmap.cell.files.resources import shipped_folder

@@ -10,7 +10,7 @@ import difflib
 from collections.abc import Collection
 from typing import Any
 
-from reachmap.cell.bins.names import bin_places
+from reachmap.cell.bins.shorthand import bin_places
 from reachmap.cell.files.collisions import mesh_scales
 from reachmap.cell.files.files import CellFiles, body_key
 from reachmap.cell.files.srdf import SrdfDescription

@@ -8,7 +8,7 @@ from functools import cache
 from importlib.resources import files
 from typing import Any
 
-from reachmap.cell.bins.names import bin_places
+from reachmap.cell.bins.shorthand import bin_places
 from reachmap.cell.text.data import at, text_at
 from reachmap.cell.text.messages import did_you_mean
 from reachmap.cell.text.overrides import is_override

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from reachmap._typing import FloatArray
-from reachmap.cell.bins.names import bin_places
+from reachmap.cell.bins.shorthand import bin_places
 from reachmap.cell.files.collisions import mesh_scales
 from reachmap.cell.files.joint_limits import MoveItLimits, parse_joint_limits
 from reachmap.cell.files.resources import NotFoundError, Resolver
