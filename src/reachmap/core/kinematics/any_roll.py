@@ -10,8 +10,7 @@ import numpy as np
 
 from reachmap._typing import FloatArray
 from reachmap.core.kinematics.solutions import Rows, distinct
-from reachmap.core.kinematics.solvers.arm import FULL_AXES, Arm
-from reachmap.core.kinematics.solvers.choice import choose_solver
+from reachmap.core.kinematics.solvers.choice import FULL_AXES, Arm, choose_solver
 from reachmap.core.robot.chain import SerialChain
 from reachmap.geometry import AXES
 

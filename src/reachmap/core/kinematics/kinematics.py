@@ -10,8 +10,7 @@ from reachmap.cell.model.cell import IkSpec
 from reachmap.core.kinematics.any_roll import AnyRollSolver, has_own_roll
 from reachmap.core.kinematics.follow import Follower, follow_many
 from reachmap.core.kinematics.solutions import within_limits
-from reachmap.core.kinematics.solvers.arm import Arm, BranchSolver
-from reachmap.core.kinematics.solvers.choice import choose_solver
+from reachmap.core.kinematics.solvers.choice import Arm, BranchSolver, choose_solver
 from reachmap.core.robot.chain import SerialChain
 from reachmap.core.robot.model import RobotModel
 from reachmap.geometry import axis_vector

@@ -28,7 +28,7 @@ from reachmap.core.kinematics.solutions import (
     joined,
     wrapped,
 )
-from reachmap.core.kinematics.solvers.arm import Arm, Way
+from reachmap.core.kinematics.solvers.choice import Arm, Way
 from reachmap.core.kinematics.solvers.numeric import NumericSolver
 from reachmap.geometry import transform_from_parts
 

@@ -19,7 +19,7 @@ from reachmap.core.kinematics.solutions import (
     turned_into,
     wrapped,
 )
-from reachmap.core.kinematics.solvers.arm import Arm, Way
+from reachmap.core.kinematics.solvers.choice import Arm, Way
 
 # Rows of the table of starts that are looked at, per start that is asked for: a fifth
 # of them shares a cell with a nearer one.

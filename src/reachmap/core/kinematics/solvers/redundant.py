@@ -30,7 +30,7 @@ from reachmap.core.kinematics.solutions import (
     joined,
     wrapped,
 )
-from reachmap.core.kinematics.solvers.arm import FULL_AXES, Arm, Way
+from reachmap.core.kinematics.solvers.choice import FULL_AXES, Arm, Way
 from reachmap.core.kinematics.solvers.numeric import NumericSolver
 
 # Rows of a nominal arm that miss by more [m or rad] are not worth steps.
