@@ -18,8 +18,7 @@ from reachmap.cli.options import (
     unused,
     with_bin,
 )
-from reachmap.cli.terminal import print_answer
-from reachmap.cli.text.tables import facts_text
+from reachmap.cli.terminal import facts_text, print_answer
 from reachmap.runtime.options import RunOptions
 
 log = logging.getLogger(__name__)

@@ -11,7 +11,7 @@ import json
 import os
 import re
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, Final
 
@@ -46,6 +46,14 @@ def print_answer(facts: Any, text: Callable[[], str], *, as_json: bool) -> None:
         click.echo(json.dumps(json_ready(facts), allow_nan=False))
     elif said := text():
         _show(said.rstrip("\n"))
+
+
+def facts_text(facts: Mapping[str, object]) -> str:
+    """One line per fact: its name, with spaces, and its value in one column."""
+    width = max(len(key) for key in facts)
+    return "\n".join(
+        f"{key.replace('_', ' '):{width}}  {value}" for key, value in facts.items()
+    )
 
 
 def _show(text: str) -> None:

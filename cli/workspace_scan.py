@@ -12,8 +12,7 @@ from reachmap.cli.options import (
     output_option,
     scan_options,
 )
-from reachmap.cli.terminal import print_answer
-from reachmap.cli.text.tables import facts_text
+from reachmap.cli.terminal import facts_text, print_answer
 from reachmap.runtime.options import RunOptions
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 WIDTH = 88
 
@@ -48,11 +48,3 @@ def fact_lines(facts: Sequence[tuple[str, str]]) -> list[str]:
             break_on_hyphens=False,
         )
     return lines
-
-
-def facts_text(facts: Mapping[str, object]) -> str:
-    """One line per fact: its name, with spaces, and its value in one column."""
-    width = max(len(key) for key in facts)
-    return "\n".join(
-        f"{key.replace('_', ' '):{width}}  {value}" for key, value in facts.items()
-    )

@@ -27,7 +27,7 @@ if TYPE_CHECKING:  # workers import this module, and have no use for HDF5
     from reachmap.runtime.progress import Progress
 
 KINDS: dict[str, str] = {
-    "workspace_map": "reachmap.scans.workspace_per_frame:KIND",
+    "workspace_map": "reachmap.scans.workspace_results:KIND",
     "bin_map": "reachmap.scans.bin_scan:KIND",
     "study": "reachmap.studies.assembly:KIND",
 }

@@ -10,18 +10,21 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from reachmap._typing import FloatArray
-from reachmap.cell.model.cell import Cell
 from reachmap.core.kinematics.windings import Windings
 from reachmap.core.planning.timing import path_length_rad
 from reachmap.core.scene import Scene
-from reachmap.maps import RunInfo, Status, WorkspaceMap, write_workspace_map
-from reachmap.maps.parts import Components
-from reachmap.runtime.job import Job, Kind, Work, blocks
+from reachmap.maps import Status
+from reachmap.runtime.job import Job, Work, blocks
 from reachmap.sampling.frames import workspace_frames
 from reachmap.scans.document import journal_settings
 from reachmap.scans.ik_survey import survey_frames
 from reachmap.scans.measured import attempt_seed
-from reachmap.scans.workspace_results import FrameResults, assemble_workspace_map
+from reachmap.scans.workspace_results import (
+    KIND,
+    FrameResults,
+    frames_of_cell,
+    tally,
+)
 
 if TYPE_CHECKING:
     from reachmap.cell.loading import LoadedCell
@@ -63,12 +66,6 @@ def per_frame_work(
         document={**document, "frames_per_unit": FRAMES_PER_UNIT},
         frames=frames,
     )
-
-
-def frames_of_cell(cell: Cell) -> int:
-    """Number of test frames of a cell's workspace scan."""
-    cubes = workspace_frames(cell)
-    return sum(cube.frames.size for cube in cubes)
 
 
 def prepare(context: PerFrameContext) -> _State:
@@ -130,39 +127,3 @@ def plan_frames(
         path_length=length,
         goal_configuration=goal,
     )
-
-
-def tally(payload: Mapping[str, Any]) -> tuple[int, int]:
-    """Frames with a path, and all frames, of a unit."""
-    status = payload["status"]
-    return int((status == Status.PATH_FOUND).sum()), len(status)
-
-
-def blank(document: Mapping[str, Any], unit: int, status: Status) -> dict[str, Any]:
-    """Payload of a unit without results."""
-    cell = Cell.model_validate_json(document["provenance"]["cell_resolved_json"])
-    size = document["frames_per_unit"]
-    left = frames_of_cell(cell) - unit * size
-    dof = len(document["joint_names"])
-    return dataclasses.asdict(FrameResults.blank(min(size, left), dof, status))
-
-
-def assemble(
-    document: Mapping[str, Any], payloads: Sequence[Any], *, run: RunInfo
-) -> WorkspaceMap:
-    """Make the map from the payloads of all units."""
-    parts = [dict(payload) for payload in payloads]
-    evidence = parts[0].pop("components", None)  # of the roadmap's one unit
-    return assemble_workspace_map(
-        document,
-        FrameResults.join([FrameResults(**part) for part in parts]),
-        run=run,
-        components=None
-        if evidence is None
-        else Components(**evidence | {"methods": tuple(evidence["methods"])}),
-    )
-
-
-KIND = Kind(
-    name="workspace_map", blank=blank, assemble=assemble, write=write_workspace_map
-)

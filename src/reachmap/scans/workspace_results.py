@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -17,8 +18,10 @@ from reachmap.maps import (
     Status,
     WorkspaceMap,
     workspace_map_from_cubes,
+    write_workspace_map,
 )
 from reachmap.maps.parts import Components, freeze
+from reachmap.runtime.job import Kind
 from reachmap.sampling.frames import CubeFrames, workspace_frames
 from reachmap.scans.document import provenance_from_document
 
@@ -77,29 +80,47 @@ class FrameResults:
         )
 
 
-def assemble_workspace_map(
-    document: Mapping[str, Any],
-    results: FrameResults,
-    *,
-    run: RunInfo,
-    components: Components | None = None,
+def frames_of_cell(cell: Cell) -> int:
+    """Number of test frames of a cell's workspace scan."""
+    cubes = workspace_frames(cell)
+    return sum(cube.frames.size for cube in cubes)
+
+
+def tally(payload: Mapping[str, Any]) -> tuple[int, int]:
+    """Frames with a path, and all frames, of a unit."""
+    status = payload["status"]
+    return int((status == Status.PATH_FOUND).sum()), len(status)
+
+
+def blank(document: Mapping[str, Any], unit: int, status: Status) -> dict[str, Any]:
+    """Payload of a unit without results."""
+    cell = Cell.model_validate_json(document["provenance"]["cell_resolved_json"])
+    size = document["frames_per_unit"]
+    left = frames_of_cell(cell) - unit * size
+    dof = len(document["joint_names"])
+    return dataclasses.asdict(FrameResults.blank(min(size, left), dof, status))
+
+
+def assemble(
+    document: Mapping[str, Any], payloads: Sequence[Any], *, run: RunInfo
 ) -> WorkspaceMap:
-    """Make the map of a scan.
+    """Make the map from the payloads of all units.
 
     Parameters
     ----------
     document : mapping
         See :func:`reachmap.scans.document.scan_document`.
-    results : FrameResults
+    payloads : sequence of mapping
+        Results of consecutive frames; of the roadmap's one unit, with its evidence.
     run : RunInfo
-    components : Components, optional
-        Evidence of the roadmap.
     """
+    parts = [dict(payload) for payload in payloads]
+    evidence = parts[0].pop("components", None)
+    results = FrameResults.join([FrameResults(**part) for part in parts])
     cell = Cell.model_validate_json(document["provenance"]["cell_resolved_json"])
-    cubes = workspace_frames(cell)
     maps: dict[str, CubeMap] = {}
     begin = 0
-    for cube in cubes:
+    for cube in workspace_frames(cell):
         end = begin + cube.frames.size
         maps[cube.name] = _cube_map(cube, results, slice(begin, end))
         begin = end
@@ -109,7 +130,9 @@ def assemble_workspace_map(
         joint_names=tuple(document["joint_names"]),
         body_pairs=tuple(document["body_pairs"]),
         method=document["method"],
-        components=components,
+        components=None
+        if evidence is None
+        else Components(**evidence | {"methods": tuple(evidence["methods"])}),
         T_world_base=cell.robot.base_pose.matrix(),
         T_base_grid=cell.T_base_grid(),
         stamp=Stamp(**document["stamp"]),
@@ -132,3 +155,8 @@ def _cube_map(cube: CubeFrames, results: FrameResults, rows: slice) -> CubeMap:
         quaternion_wxyz=cube.frames.quaternion_wxyz,
         **{name: part(name) for name in FrameResults.__slots__},
     )
+
+
+KIND = Kind(
+    name="workspace_map", blank=blank, assemble=assemble, write=write_workspace_map
+)

@@ -21,8 +21,7 @@ from reachmap.runtime.progress import Progress
 from reachmap.sampling.frames import workspace_frames
 from reachmap.scans.document import journal_settings
 from reachmap.scans.ik_survey import MAX_COUNT, Survey, SurveyContext, survey_in_stages
-from reachmap.scans.workspace_per_frame import KIND, frames_of_cell, tally
-from reachmap.scans.workspace_results import FrameResults
+from reachmap.scans.workspace_results import KIND, FrameResults, frames_of_cell, tally
 
 
 def roadmap_work(scene: Scene, document: Mapping[str, Any]) -> Work:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 import pinocchio as pin
 
@@ -74,8 +76,11 @@ class Kinematics:
             self._solver = AnyRollSolver(arm, axis)
         else:
             self._solver = choose_solver(arm)
-        self._follower = Follower(robot)
         self._data = robot.model.createData()
+
+    @cached_property
+    def _follower(self) -> Follower:
+        return Follower(self.robot)
 
     @property
     def method(self) -> str:
