@@ -7,6 +7,7 @@ each other are a pair, but for links that a joint joins and for pairs that may t
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -347,3 +348,16 @@ class _Builder:
         for first in parts(a):
             for second in parts(b):
                 yield first, second
+
+
+def disable_cached_guesses(requests: Any) -> None:
+    """Make checks independent of guesses cached by earlier ones.
+
+    Its guess would change answers in the last digits, and saves no time that could be
+    measured.
+    """
+    with warnings.catch_warnings():
+        # The setting that coal has in its place acts beside this one, not instead.
+        warnings.simplefilter("ignore", DeprecationWarning)
+        for request in requests:
+            request.enable_cached_gjk_guess = False

@@ -19,10 +19,10 @@ import numpy as np
 import pinocchio as pin
 
 from reachmap._typing import BoolArray, FloatArray, IntArray
-from reachmap.core.bystander import Bystander, disable_cached_guesses
-from reachmap.core.collision.bodies import BodyGeometry
+from reachmap.core.collision.bodies import BodyGeometry, disable_cached_guesses
 from reachmap.core.collision.displacement import MotionBound
 from reachmap.core.collision.never_collide import PairMotion, pairs_that_never_collide
+from reachmap.core.collision.pair_checker import PairChecker
 from reachmap.core.collision.shapes import convex_hull
 from reachmap.core.robot.chain import SerialChain
 from reachmap.core.trace import EVERY, FREE, TOUCHING, Trace
@@ -119,7 +119,7 @@ class CollisionChecker:
         # keep the distance that the camera needs from the floor.
         self._shares = (self.pair_reach_m / self.reach_m).max(axis=1, initial=0.0)
         self.checks = 0
-        self._bystanders: dict[tuple[int, str, int], Bystander] = {}
+        self._pair_checkers: dict[tuple[int, str, int], PairChecker] = {}
         self._start_engine()
 
     def _start_engine(self) -> None:
@@ -156,8 +156,8 @@ class CollisionChecker:
                 body.placement = placement
                 if shapes and name in shapes:
                     body.geometry = shapes[name]
-        for key in [key for key in self._bystanders if key[1] in T_root_body]:
-            del self._bystanders[key]
+        for key in [key for key in self._pair_checkers if key[1] in T_root_body]:
+            del self._pair_checkers[key]
         self._start_engine()
 
     def _broadphase_with(self, geometry: Any, margins: FloatArray) -> tuple[Any, Any]:
@@ -233,9 +233,9 @@ class CollisionChecker:
             The moving one, as :meth:`bodies_against` counts; EVERY for all of them.
         """
         key = about, name, body
-        if key not in self._bystanders:
+        if key not in self._pair_checkers:
             pairs = self._pairs_of(name, body)
-            self._bystanders[key] = Bystander(
+            self._pair_checkers[key] = PairChecker(
                 self._model,
                 self.bodies if about == FREE else self.hulls,
                 pairs,
@@ -244,7 +244,7 @@ class CollisionChecker:
         robot = self.robot
         if len(robot.following):
             Q = np.array([robot.body_configuration(q) for q in Q])
-        return self._bystanders[key].touched(Q)
+        return self._pair_checkers[key].touched(Q)
 
     def _pairs_of(self, name: str, body: int = EVERY) -> IntArray:
         moving = None if body == EVERY else int(self.bound.on_chain[body])

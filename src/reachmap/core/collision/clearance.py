@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from reachmap._typing import BoolArray, FloatArray, IntArray
-from reachmap.core.bystander import disable_cached_guesses
+from reachmap.core.collision.bodies import disable_cached_guesses
 from reachmap.core.collision.checker import CollisionChecker
 from reachmap.core.trace import Trace
 from reachmap.geometry import pieces

@@ -1,4 +1,4 @@
-"""One body that stands still against all that moves, for many configurations at once.
+"""Checks of a few pairs of bodies, for many configurations at once.
 
 What has changed between two cells is mostly one body; whether it touches is asked of
 its pairs alone, in one call of the engine, with the answers of a check of all pairs.
@@ -6,16 +6,16 @@ its pairs alone, in one call of the engine, with the answers of a check of all p
 
 from __future__ import annotations
 
-import warnings
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
 from reachmap._typing import BoolArray, FloatArray, IntArray
+from reachmap.core.collision.bodies import disable_cached_guesses
 
 
-class Bystander:
+class PairChecker:
     """Checks of some pairs of a geometry.
 
     Parameters
@@ -55,16 +55,3 @@ class Bystander:
         columns = np.asfortranarray(Q.T)
         found = pin.computeCollisionsInParallel(1, self._pool, columns, True, False)
         return np.asarray(found, bool)
-
-
-def disable_cached_guesses(requests: Any) -> None:
-    """Make checks independent of guesses cached by earlier ones.
-
-    Its guess would change answers in the last digits, and saves no time that could be
-    measured.
-    """
-    with warnings.catch_warnings():
-        # The setting that coal has in its place acts beside this one, not instead.
-        warnings.simplefilter("ignore", DeprecationWarning)
-        for request in requests:
-            request.enable_cached_gjk_guess = False
