@@ -20,7 +20,7 @@ from reachmap.motions.motion import best_rows
 from reachmap.robustness.errors import Errors, ErrorSize, misplacement, unit_errors
 from reachmap.robustness.problem import RobustnessProblem
 from reachmap.robustness.replay import PerturbedCell, replay_unit
-from reachmap.tools.options import cell_of_artefact
+from reachmap.tools.prologue import cell_of_artefact
 
 SEED = 12345
 

@@ -70,7 +70,7 @@ def command(
     Example: reachmap bin-scan placement.h5 --set bin_scan.repeats=1
     """
     from reachmap.tools.bin_scan import bin_scan, estimate_bin_scan, summary_of_bin
-    from reachmap.tools.options import written_by
+    from reachmap.tools.prologue import written_by
 
     overrides = with_bin(overrides, bin_name)
     if attempts is not None:

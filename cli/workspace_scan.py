@@ -53,7 +53,7 @@ def command(
     Example: reachmap workspace-scan ur5-eye-in-hand --seed 7
     """
     check_scan_options(run, dry_run=dry_run)
-    from reachmap.tools.options import written_by
+    from reachmap.tools.prologue import written_by
     from reachmap.tools.workspace_scan import (
         estimate_workspace_scan,
         summary_of_workspace,

@@ -12,7 +12,7 @@ from reachmap._typing import FloatArray
 from reachmap.core.collision.bin_fit import BinFit
 from reachmap.errors import SceneError
 from reachmap.maps.records import Status
-from reachmap.maps.summary.unreachable import most_likely_cause
+from reachmap.maps.summary.statistics import most_likely_cause
 from reachmap.placement.mapped.candidates import Candidate, CandidateTable
 from reachmap.placement.mapped.exact import PlacedScene, Pose, pose_of_bin
 from reachmap.placement.mapped.imaging import UNSEEN

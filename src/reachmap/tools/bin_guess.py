@@ -20,7 +20,7 @@ from reachmap.geometry import (
     yaw_transform,
 )
 from reachmap.maps.records import NO_PAIR, Status
-from reachmap.maps.summary.unreachable import most_likely_cause
+from reachmap.maps.summary.statistics import most_likely_cause
 from reachmap.sampling.frames import FrameGrid, approach_distance_m, bin_test_frames
 from reachmap.tools.trial import reach_of
 

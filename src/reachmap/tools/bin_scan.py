@@ -35,12 +35,13 @@ from reachmap.scans.cycle.part_fit import require_room_for_part
 from reachmap.scans.cycle.scenes import CycleScenes, stages_of
 from reachmap.scans.document import checking_settings, scan_document
 from reachmap.scans.ik_survey import survey_frames
-from reachmap.tools.options import warn_of_nothing, with_seed
 from reachmap.tools.prologue import (
     check_scan_output,
     path_of_cell,
     refuse_cell_files,
     shards_of,
+    warn_of_nothing,
+    with_seed,
 )
 
 if TYPE_CHECKING:

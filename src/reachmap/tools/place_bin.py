@@ -58,9 +58,8 @@ from reachmap.scans.document import (
     provenance_from_document,
     scan_document,
 )
-from reachmap.tools.options import check_places, with_seed
 from reachmap.tools.placement_picture import draw_placed
-from reachmap.tools.prologue import refuse_cell_files
+from reachmap.tools.prologue import check_places, refuse_cell_files, with_seed
 
 if TYPE_CHECKING:
     from reachmap.cell.loading import LoadedCell

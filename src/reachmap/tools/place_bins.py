@@ -23,7 +23,6 @@ from reachmap.maps import (
 from reachmap.maps.bytes.publish import check_picture
 from reachmap.maps.provenance import cell_of_artefact
 from reachmap.runtime.options import IN_PROCESS, RunOptions
-from reachmap.tools.options import with_seed
 from reachmap.tools.place_bin import (
     PlacedBin,
     PlacementChoice,
@@ -31,7 +30,7 @@ from reachmap.tools.place_bin import (
     placed_bin,
 )
 from reachmap.tools.placement_picture import draw_placed
-from reachmap.tools.prologue import refuse_cell_files
+from reachmap.tools.prologue import refuse_cell_files, with_seed
 
 if TYPE_CHECKING:
     from reachmap.cell.loading import LoadedCell

@@ -47,8 +47,12 @@ from reachmap.placement.mapped.sample import open_frames
 from reachmap.placement.predicted.region import AXES, Region
 from reachmap.runtime.options import IN_PROCESS, RunOptions
 from reachmap.runtime.progress import Progress
-from reachmap.tools.options import check_places, with_seed
-from reachmap.tools.prologue import path_of_cell, refuse_cell_files
+from reachmap.tools.prologue import (
+    check_places,
+    path_of_cell,
+    refuse_cell_files,
+    with_seed,
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,8 +1,10 @@
-"""Checks of outputs that a tool makes before any work."""
+"""What tools share: checks before any work, names of outputs, a warning after it."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+import logging
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 
@@ -11,10 +13,13 @@ from reachmap.cell.loading import cell_path
 from reachmap.cell.text.data import text_at
 from reachmap.cell.text.yaml_reader import parse_yaml
 from reachmap.disk import is_there, real_path
-from reachmap.errors import CellError
-from reachmap.maps import check_output, check_outputs
+from reachmap.errors import CellError, SettingsError
+from reachmap.maps import BinMap, WorkspaceMap, check_output, check_outputs
+from reachmap.maps.summary.statistics import why_unreachable
 from reachmap.runtime.options import RunOptions
 from reachmap.runtime.store import store_path
+
+logger = logging.getLogger(__name__)
 
 
 def check_scan_output(
@@ -71,3 +76,41 @@ def _files_of(loaded: LoadedCell) -> Iterator[Path]:
             if reference:
                 yield loaded.resolve(reference)
     yield from loaded.mesh_paths.values()
+
+
+def with_seed(overrides: Sequence[str], seed: int | None) -> tuple[str, ...]:
+    """Append to overrides the seed of ``--seed``, if one was given."""
+    return (*overrides, *(() if seed is None else (f"seed={seed}",)))
+
+
+def check_places(
+    limits: Mapping[str, tuple[float, float]], fixed: Mapping[str, float]
+) -> None:
+    """Refuse ranges that run backwards, and what is no number.
+
+    Raises
+    ------
+    SettingsError
+        Also of a range that ends nowhere.
+    """
+    for name, (low, high) in limits.items():
+        if not -math.inf < low <= high < math.inf:
+            raise SettingsError(
+                f"{name} from {low:g} to {high:g}: expected two numbers, the smaller "
+                "one first"
+            )
+    for name, value in fixed.items():
+        if not math.isfinite(value):
+            raise SettingsError(f"--fix {name}={value:g}: expected a number")
+
+
+def written_by(output: Path, run: RunOptions) -> Path:
+    """Name the file that a scan leaves: the artefact, or the journal of a shard."""
+    return output if run.shard is None else store_path(output, run.shard)
+
+
+def warn_of_nothing(record: WorkspaceMap | BinMap | None, output: Path) -> None:
+    """Warn on stderr if a map has nothing reachable, with the cause."""
+    why = "" if record is None else why_unreachable(record)
+    if why:
+        logger.warning("%s: %s", output, why)

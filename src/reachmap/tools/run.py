@@ -14,8 +14,8 @@ from reachmap.maps import read_bin_map, read_placement, read_workspace_map
 from reachmap.runtime.options import IN_PROCESS, RunOptions
 from reachmap.tools.bin_scan import bin_scan
 from reachmap.tools.heatmap import heatmap
-from reachmap.tools.options import with_seed
 from reachmap.tools.place_bin import place_bin
+from reachmap.tools.prologue import with_seed
 from reachmap.tools.rank import ListFormat, rank, read_list
 from reachmap.tools.report import report
 from reachmap.tools.workspace_scan import workspace_scan

@@ -34,11 +34,11 @@ from reachmap.studies.optimiser import Optimiser
 from reachmap.studies.outcomes import OPERATORS, Requirement
 from reachmap.tools.halved_study import halved_work
 from reachmap.tools.optimised_study import Search, search_work
-from reachmap.tools.options import with_seed
 from reachmap.tools.prologue import (
     check_scan_output,
     path_of_cell,
     refuse_cell_files,
+    with_seed,
 )
 from reachmap.tools.variant import (
     NOT_OF_WORKSPACE,

@@ -24,12 +24,13 @@ from reachmap.scans.document import checking_settings, scan_document
 from reachmap.scans.ik_survey import survey_frames
 from reachmap.scans.workspace_per_frame import per_frame_work, plan_frames
 from reachmap.scans.workspace_roadmap import connect_survey, roadmap_work
-from reachmap.tools.options import warn_of_nothing, with_seed
 from reachmap.tools.prologue import (
     check_scan_output,
     path_of_cell,
     refuse_cell_files,
     shards_of,
+    warn_of_nothing,
+    with_seed,
 )
 
 logger = logging.getLogger(__name__)

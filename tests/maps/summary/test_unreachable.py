@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from reachmap.maps import Status
-from reachmap.maps.summary.unreachable import most_likely_cause
+from reachmap.maps.summary.statistics import most_likely_cause
 
 PAIRS = ("housing | bin wall +x", "forearm_link | post")
 

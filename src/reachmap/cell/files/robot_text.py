@@ -6,11 +6,11 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from reachmap.cell.files.resources import Resolver
-from reachmap.cell.files.urdf import MAX_URDF_BYTES
 from reachmap.cell.files.xacro import Expansion, expand_xacro
 from reachmap.cell.files.xml_text import parse_xml, read_xml
 from reachmap.errors import CellError
 
+MAX_URDF_BYTES = 20_000_000
 DEFINITIONS = ("xacro:arg", "xacro:property", "xacro:macro")
 # Suffixes of files that people take for robot descriptions, and what they are.
 OTHER_FILES = {

@@ -25,7 +25,6 @@ from reachmap.cell.files.xml_text import parse_xml
 from reachmap.errors import CellError
 from reachmap.geometry import inverse_transform
 
-MAX_URDF_BYTES = 20_000_000
 MAX_LINKS = 2_000
 MOVING = ("revolute", "continuous", "prismatic")
 # Of several degrees of freedom: held at zero beside the arm, refused in it.
