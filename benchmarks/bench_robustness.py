@@ -15,12 +15,12 @@ from pathlib import Path
 import numpy as np
 
 from reachmap.maps import read_bin_map
+from reachmap.maps.provenance import cell_of_artefact
 from reachmap.maps.robustness.format import read_robustness
 from reachmap.motions.motion import best_rows
 from reachmap.robustness.errors import Errors, ErrorSize, misplacement, unit_errors
 from reachmap.robustness.problem import RobustnessProblem
 from reachmap.robustness.replay import PerturbedCell, replay_unit
-from reachmap.tools.prologue import cell_of_artefact
 
 SEED = 12345
 

@@ -39,3 +39,12 @@ def test_a_test_grasp_is_decided_by_few_modules(tmp_path: Path) -> None:
         run("bin-scan", "--cell", "planar-toy", "--set", "bin_scan.grid=[2,1]",
             "-j", "1", "-o", str(tmp_path / "bin.h5"))  # fmt: skip
     assert 0 < len(found.in_unit) <= 40, sorted(found.in_unit)
+
+
+@pytest.mark.slow
+def test_a_cell_is_scanned_by_few_modules(tmp_path: Path) -> None:
+    """From the path of the cell to its workspace map."""
+    cell = Path(__file__).parents[2] / "cells" / "planar-toy.yaml"
+    with journey() as found:
+        run("workspace-scan", str(cell), "-j", "1", "-o", str(tmp_path / "map.h5"))
+    assert len(found.files) <= 102, sorted(found.files)

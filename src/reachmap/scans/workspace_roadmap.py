@@ -13,8 +13,7 @@ from reachmap._typing import FloatArray, IntArray
 from reachmap.core.planning.connection import Connection, connect
 from reachmap.core.scene import Scene
 from reachmap.maps import Status
-from reachmap.maps.confidence import confidence_of
-from reachmap.maps.parts import Components
+from reachmap.maps.parts import Components, confidence_of
 from reachmap.runtime.job import Stages, Work
 from reachmap.runtime.journal import UNITS
 from reachmap.runtime.progress import Progress

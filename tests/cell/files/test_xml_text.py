@@ -7,8 +7,8 @@ from pathlib import Path
 import pinocchio as pin
 import pytest
 
+from reachmap.cell.files.robot_text import parse_xml, read_xml
 from reachmap.cell.files.urdf import parse_urdf
-from reachmap.cell.files.xml_text import parse_xml, read_xml
 from reachmap.errors import CellError
 
 ARM = (

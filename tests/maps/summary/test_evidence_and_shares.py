@@ -7,7 +7,7 @@ import pytest
 from scipy import stats
 
 from reachmap.geometry import rotation_from_quaternion_wxyz
-from reachmap.maps.confidence import confidence_of
+from reachmap.maps.parts import confidence_of
 from reachmap.maps.records import Status
 from reachmap.maps.summary.directions import (
     direction_percent,

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from xml.etree import ElementTree
 from xml.sax.saxutils import quoteattr
 
+from reachmap.cell.files.robot_text import parse_xml
 from reachmap.cell.files.urdf import UrdfDescription
-from reachmap.cell.files.xml_text import parse_xml
 from reachmap.errors import CellError
 
 

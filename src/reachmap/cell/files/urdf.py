@@ -21,7 +21,7 @@ from reachmap.cell.files.collisions import (
     links_without_collision,
     read_collisions,
 )
-from reachmap.cell.files.xml_text import parse_xml
+from reachmap.cell.files.robot_text import parse_xml
 from reachmap.errors import CellError
 from reachmap.geometry import inverse_transform
 

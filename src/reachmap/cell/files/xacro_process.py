@@ -13,8 +13,7 @@ import xacro
 from xacro import substitution_args
 
 from reachmap.cell.files.resources import NotFoundError, Resolver
-from reachmap.cell.files.robot_text import MAX_URDF_BYTES
-from reachmap.cell.files.xml_text import read_xml
+from reachmap.cell.files.robot_text import MAX_URDF_BYTES, read_xml
 from reachmap.errors import CellError
 
 

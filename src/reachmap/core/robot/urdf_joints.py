@@ -11,6 +11,7 @@ import xml.etree.ElementTree as ET
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from reachmap.cell.files.robot_text import parse_xml
 from reachmap.cell.files.urdf import (
     FREE_JOINTS,
     MOVING,
@@ -19,7 +20,6 @@ from reachmap.cell.files.urdf import (
     full_turn,
     parse_urdf,
 )
-from reachmap.cell.files.xml_text import parse_xml
 from reachmap.errors import SceneError
 
 # Joints and links are name spaces of their own in a URDF, and one in Pinocchio.

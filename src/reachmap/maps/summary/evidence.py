@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from reachmap._typing import CodeArray, IntArray
-from reachmap.maps.confidence import confidence_of
-from reachmap.maps.parts import Components
+from reachmap.maps.parts import Components, confidence_of
 from reachmap.maps.records import Status
 
 
@@ -32,7 +31,7 @@ class EvidenceSummary:
     agreed : int
         Frames whose verdict an independent method confirmed.
     confidence : float or None
-        Least of the components, see :func:`reachmap.maps.confidence.confidence_of`;
+        Least of the components, see :func:`reachmap.maps.parts.confidence_of`;
         None without components.
     """
 
