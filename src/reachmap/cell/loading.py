@@ -110,16 +110,7 @@ def cell_from_text(
     document = parse_yaml(text, label)
     if not isinstance(document.data, dict):
         raise CellError(f"{label}:1:1: expected a mapping with format: reachmap.cell")
-    gather_bins(document)
-    restore_expressions(document)
-    apply_overrides(document, overrides, Cell)
-    resolve_expressions(document)
-    write_out_mount(document)
-    write_out_bins(document)
-    write_out_carriers(document)
-    write_out_fill(document)
-    check_part_choice(document)
-    cell = validated(document)
+    cell = _validated(document, overrides)
     files = read_files(document, directory)
     if files.robot is not None:
         check_names(document, files.robot, files.srdf_description)
@@ -148,6 +139,20 @@ def cell_from_text(
         joint_limits=files.joint_limits,
         warnings=warnings,
     )
+
+
+def _validated(document: Document, overrides: Sequence[str]) -> Cell | None:
+    """Apply overrides, write out shorthand, and validate; None where that fails."""
+    gather_bins(document)
+    restore_expressions(document)
+    apply_overrides(document, overrides, Cell)
+    resolve_expressions(document)
+    write_out_mount(document)
+    write_out_bins(document)
+    write_out_carriers(document)
+    write_out_fill(document)
+    check_part_choice(document)
+    return validated(document)
 
 
 def cell_path(name_or_path: str) -> Path:
@@ -257,16 +262,7 @@ def stored_cell(
         raise CellError(f"{source}: the cell is not JSON: {error}") from None
     if not isinstance(document.data, dict):
         raise CellError(f"{source}: the cell is not a JSON object")
-    gather_bins(document)
-    restore_expressions(document)
-    apply_overrides(document, changes, Cell)
-    resolve_expressions(document)
-    write_out_mount(document)
-    write_out_bins(document)
-    write_out_carriers(document)
-    write_out_fill(document)
-    check_part_choice(document)
-    cell = validated(document)
+    cell = _validated(document, changes)
     document.raise_mistakes()
     if cell is None:
         raise CellError(f"{source}: cannot be loaded")

@@ -34,6 +34,9 @@ if TYPE_CHECKING:
 
 logger = logging.getLogger(__name__)
 
+# Distance of the points that a TCP path is measured by.
+TCP_STEP_RAD = 0.02
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Scene:
@@ -266,11 +269,11 @@ class Scene:
                 problems.append(f"{self.loaded.cell.bin_key}.pose: {contact.pair}")
         return tuple(problems)
 
-    def tcp_path_points(self, path: FloatArray, step_rad: float = 0.02) -> FloatArray:
+    def tcp_path_points(self, path: FloatArray) -> FloatArray:
         """TCP positions along a joint path, shape (n, 3) [m]."""
         pieces = [path[:1]]
         for q_from, q_to in zip(path[:-1], path[1:], strict=True):
-            steps = max(1, int(np.ceil(np.linalg.norm(q_to - q_from) / step_rad)))
+            steps = max(1, int(np.ceil(np.linalg.norm(q_to - q_from) / TCP_STEP_RAD)))
             shares = np.arange(1, steps + 1)[:, None] / steps
             pieces.append(q_from + shares * (q_to - q_from))
         return self.kinematics.forward_many(np.vstack(pieces))[:, :3, 3]

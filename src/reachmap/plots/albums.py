@@ -213,21 +213,16 @@ def placement_album(
     placement: BinPlacement,
     workspace: WorkspaceMap | None = None,
     *,
-    camera_view: FloatArray | None = None,
     percent_map: PercentMap = "RdYlGn",
     tables: bool = False,
 ) -> list[Picture | Table]:
-    """List the picture of a placement, on the map it was chosen from if given.
-
-    ``camera_view``, shape (n, 2), is drawn as an outline in robot_base [m].
-    """
+    """List the picture of a placement, on the map it was chosen from if given."""
     picture = _picture(
         "placement",
         placement_words(placement)[0],
         draw_placement,
         placement,
         workspace,
-        camera_view=camera_view,
         percent_map=percent_map,
     )
     if not tables:

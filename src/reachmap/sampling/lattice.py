@@ -131,31 +131,25 @@ def cube_lattice(cube: CubeSpec, z_step: float) -> Lattice:
     )
 
 
-def merge_coordinates(
-    axes: Sequence[FloatArray], tolerance_m: float = MATCH_TOLERANCE_M
-) -> FloatArray:
+def merge_coordinates(axes: Sequence[FloatArray]) -> FloatArray:
     """Union of coordinates along one axis, rising; near-equal ones count once."""
     values = np.sort(np.concatenate([np.asarray(a, float) for a in axes]))
     first = np.ones(len(values), bool)
-    first[1:] = np.diff(values) > tolerance_m
+    first[1:] = np.diff(values) > MATCH_TOLERANCE_M
     return np.asarray(values[first])
 
 
-def stitch(
-    lattices: Sequence[Lattice], tolerance_m: float = MATCH_TOLERANCE_M
-) -> Stitching:
+def stitch(lattices: Sequence[Lattice]) -> Stitching:
     """Join lattices into one; points are matched by position, never by index.
 
     Parameters
     ----------
     lattices : sequence of Lattice
-    tolerance_m : float
-        Coordinates closer than this are the same [m].
     """
     union = Lattice(
-        x=merge_coordinates([item.x for item in lattices], tolerance_m),
-        y=merge_coordinates([item.y for item in lattices], tolerance_m),
-        z=merge_coordinates([item.z for item in lattices], tolerance_m),
+        x=merge_coordinates([item.x for item in lattices]),
+        y=merge_coordinates([item.y for item in lattices]),
+        z=merge_coordinates([item.z for item in lattices]),
     )
     index = tuple(
         (

@@ -65,9 +65,8 @@ class App:
         self._busy = threading.Lock()
         self._stop = threading.Event()
         if isinstance(record, BinPlacement) and record.runner_up >= 0:
-            self.stage.put_ghost_bin(
-                record.T_base_level @ record.T_level_bin(record.runner_up),
-                name="runner_up",
+            self.stage.put_runner_up(
+                record.T_base_level @ record.T_level_bin(record.runner_up)
             )
         self._build_panel()
         self.refresh()

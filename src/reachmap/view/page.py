@@ -219,10 +219,7 @@ def _placement_page(
 ) -> str:
     stage.put_points(points, np.arange(len(points.position)), points.main, scale=0.7)
     if record.runner_up >= 0:
-        stage.put_ghost_bin(
-            record.T_base_level @ record.T_level_bin(record.runner_up),
-            name="runner_up",
-        )
+        stage.put_runner_up(record.T_base_level @ record.T_level_bin(record.runner_up))
     stage.put_label("The bin as chosen; glass: the runner-up", name="/l")
     recording = server.get_scene_serializer()
     recording.insert_sleep(LEVEL_S)

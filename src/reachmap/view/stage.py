@@ -144,8 +144,8 @@ class Stage:
             visible=visible,
         )
 
-    def put_ghost_bin(self, T_base_bin: FloatArray, *, name: str) -> None:
-        """Draw the bin once more, as a glass one, at another pose."""
+    def put_runner_up(self, T_base_bin: FloatArray) -> None:
+        """Draw the bin once more, as a glass one, where the runner-up has it."""
         own = next(iter([s for s in self.cell.solids if s.kind == "bin"]), None)
         if own is None:
             return
@@ -155,7 +155,11 @@ class Stage:
         for index, solid in enumerate(self.cell.solids):
             if solid.kind == "bin":
                 self._mesh(
-                    f"/{name}/{index}", solid, T_there @ poses[index], BIN, opacity=0.22
+                    f"/runner_up/{index}",
+                    solid,
+                    T_there @ poses[index],
+                    BIN,
+                    opacity=0.22,
                 )
 
     def put_way(self, points: FloatArray, *, name: str, visible: bool = True) -> Any:
@@ -170,15 +174,13 @@ class Stage:
             visible=visible,
         )
 
-    def put_axes(
-        self, T_base_frame: FloatArray | None, *, name: str = "/frame"
-    ) -> None:
+    def put_axes(self, T_base_frame: FloatArray | None) -> None:
         """Draw the axes of a frame, or remove them."""
         if T_base_frame is None:
-            self.scene.add_frame(name, visible=False)
+            self.scene.add_frame("/frame", visible=False)
             return
         self.scene.add_frame(
-            name,
+            "/frame",
             axes_length=0.07,
             axes_radius=0.003,
             origin_radius=0.005,

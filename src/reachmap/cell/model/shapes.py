@@ -182,7 +182,7 @@ def _hull(points: FloatArray) -> TriangleMesh:
     )
 
 
-def _revolved(profile: FloatArray, steps: int = ROUND_STEPS) -> TriangleMesh:
+def _revolved(profile: FloatArray) -> TriangleMesh:
     """Surface of revolution about z.
 
     Parameters
@@ -190,9 +190,8 @@ def _revolved(profile: FloatArray, steps: int = ROUND_STEPS) -> TriangleMesh:
     profile : array, shape (n, 2)
         Radius and height of points from the lower end to the upper one [m]; the first
         and the last lie on the axis.
-    steps : int
-        Corners of each ring.
     """
+    steps = ROUND_STEPS
     angle = np.linspace(0.0, 2.0 * np.pi, steps, endpoint=False)
     ring = np.stack([np.cos(angle), np.sin(angle), np.zeros(steps)], axis=-1)
     up = np.array([0.0, 0.0, 1.0])

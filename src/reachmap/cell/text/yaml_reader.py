@@ -166,34 +166,31 @@ class Document:
         raise CellError(dict.fromkeys(one.text(self.data) for one in ordered))
 
 
-def read_text(path: Path, *, limit: int, label: str | None = None) -> str:
+def read_text(path: Path, *, limit: int) -> str:
     """Read a UTF-8 text file of bounded size; CellError names the file."""
-    label = label or str(path)
-    data = read_bytes(path, limit=limit, label=label)
+    data = read_bytes(path, limit=limit)
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line = data.count(b"\n", 0, error.start) + 1
         raise CellError(
-            f"{label}:{line}:1: expected UTF-8 text "
-            f"(got byte 0x{data[error.start]:02x})"
+            f"{path}:{line}:1: expected UTF-8 text (got byte 0x{data[error.start]:02x})"
         ) from None
 
 
-def read_bytes(path: Path, *, limit: int, label: str | None = None) -> bytes:
+def read_bytes(path: Path, *, limit: int) -> bytes:
     """Read a regular file of bounded size; CellError names the file."""
-    label = label or str(path)
     try:
         if not path.is_file():
             reason = "is a folder" if path.is_dir() else "no such file"
-            raise CellError(f"{label}: {reason}")
+            raise CellError(f"{path}: {reason}")
         with path.open("rb") as stream:
             data = stream.read(limit + 1)
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
-        raise CellError(f"{label}: cannot be read ({reason})") from None
+        raise CellError(f"{path}: cannot be read ({reason})") from None
     if len(data) > limit:
-        raise CellError(f"{label}: larger than the limit of {limit:,} bytes")
+        raise CellError(f"{path}: larger than the limit of {limit:,} bytes")
     return data
 
 

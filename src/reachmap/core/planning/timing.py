@@ -16,6 +16,9 @@ import numpy as np
 
 from reachmap._typing import FloatArray
 
+# Points nearer than this to the previous one, or to the straight line, are left out.
+SAME_RAD: Final = 1e-9
+
 
 def path_length_rad(path: FloatArray) -> float:
     """Euclidean joint-space length of a polyline (n, dof) [rad]."""
@@ -27,14 +30,12 @@ def polyline_length_m(points: FloatArray) -> float:
     return float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
 
 
-def merge_straight(path: FloatArray, tolerance_rad: float = 1e-9) -> FloatArray:
+def merge_straight(path: FloatArray) -> FloatArray:
     """Leave out repeated points and points on a straight line between neighbours.
 
     Parameters
     ----------
     path : array, shape (n, dof)
-    tolerance_rad : float
-        Points nearer than this to the previous one, or to the straight line, go.
 
     Returns
     -------
@@ -50,15 +51,15 @@ def merge_straight(path: FloatArray, tolerance_rad: float = 1e-9) -> FloatArray:
     for point, following in zip(path[1:-1], path[2:], strict=True):
         before, after = point - kept[-1], following - point
         length = np.linalg.norm(before)
-        if length <= tolerance_rad:
+        if length <= SAME_RAD:
             continue
         direction = before / length
         along = float(after @ direction)
         aside = np.linalg.norm(after - along * direction)
-        if along >= 0 and aside <= tolerance_rad:
+        if along >= 0 and aside <= SAME_RAD:
             continue
         kept.append(point)
-    if len(path) > 1 and np.linalg.norm(path[-1] - kept[-1]) > tolerance_rad:
+    if len(path) > 1 and np.linalg.norm(path[-1] - kept[-1]) > SAME_RAD:
         kept.append(path[-1])
     return np.array(kept)
 

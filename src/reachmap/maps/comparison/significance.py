@@ -13,6 +13,8 @@ from reachmap._typing import BoolArray, FloatArray, IntArray
 Z_95 = 1.959963984540054
 """Quantile of the standard normal distribution that leaves 2.5 % above it."""
 
+FALSE_DISCOVERY_RATE = 0.05
+
 
 def mcnemar_exact(gained: int, lost: int) -> float:
     """Two-sided exact p-value of McNemar's test for paired outcomes.
@@ -140,16 +142,15 @@ def fisher_exact(
     return np.array(values, float)[place.ravel()]
 
 
-def benjamini_hochberg(p_values: FloatArray, rate: float = 0.05) -> BoolArray:
-    """Which of many tests are significant at a false-discovery rate.
+def benjamini_hochberg(p_values: FloatArray) -> BoolArray:
+    """Which of many tests are significant at a false-discovery rate of 5 %.
 
     Among a thousand squares, fifty fall below 0.05 by chance alone; this keeps the
-    expected share of such ones among those that are named below ``rate``.
+    expected share of such ones among those that are named below 5 %.
 
     Parameters
     ----------
     p_values : array, shape (n,)
-    rate : float
 
     Returns
     -------
@@ -164,4 +165,4 @@ def benjamini_hochberg(p_values: FloatArray, rate: float = 0.05) -> BoolArray:
 
     if not len(p_values):
         return np.zeros(0, bool)
-    return np.asarray(stats.false_discovery_control(p_values) <= rate)
+    return np.asarray(stats.false_discovery_control(p_values) <= FALSE_DISCOVERY_RATE)
