@@ -60,7 +60,7 @@ def entries(
 
     def imaged_from(pose: Pose) -> FloatArray | None:
         placed = PlacedScene(scene, pose, sample)
-        found = imaging_configurations(placed.scene, placed.Q, placed.frame)
+        found = imaging_configurations(placed.scene, *placed.grasps)
         return next(found, None)
 
     chosen, paper = (

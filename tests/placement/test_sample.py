@@ -207,7 +207,8 @@ def test_where_the_roll_is_free_a_direction_counts_with_any_roll():
         branches = [placed.scene.kinematics.solve(T @ roll) for roll in rolls]
         if any(placed.scene.checker.is_free(q) for Q in branches for q in Q):
             wanted.append(k)
-    assert sorted(set(placed.frame.tolist())) == wanted
+    assert sorted(set(placed.grasps[1].tolist())) == wanted
+    assert placed.bound == pytest.approx(100.0 * sample.weight[wanted].sum())
 
 
 def test_rolls_turn_about_the_approach_axis():

@@ -134,7 +134,7 @@ def test_imaging_configurations_see_the_whole_bin_and_are_free():
     T_flange_camera[:3, 3] = camera.xyz
     T_tcp_flange = np.eye(4)
     T_tcp_flange[2, 3] = -0.275
-    found = list(imaging_configurations(placed.scene, placed.Q, placed.frame))
+    found = list(imaging_configurations(placed.scene, *placed.grasps))
     assert len(found) >= 4
     inner = scene.loaded.cell.bin.inner
     corners = corners_of(inner, inner[2]) @ scene.T_base_bin[:3, :3].T
@@ -153,9 +153,7 @@ def test_something_in_the_line_of_sight_leaves_no_configuration():
         '"shape":{"box":[0.5,0.5,0.002]},"pose":{"xyz":[0.45,0,0.12]}}'
     )
     placed = placed_ur5((0.45, 0.0, 0.0, 1.57), plate)
-    assert (
-        next(imaging_configurations(placed.scene, placed.Q, placed.frame), None) is None
-    )
+    assert next(imaging_configurations(placed.scene, *placed.grasps), None) is None
 
 
 STANDING = (
@@ -191,7 +189,7 @@ def test_the_arm_waits_where_it_does_not_hide_the_bin():
     scene = placed.scene
     own = scene.scan_configuration
     assert "hides part of the bin" in picture_of(scene, own)
-    found = list(islice(imaging_configurations(scene, placed.Q, placed.frame), 4))
+    found = list(islice(imaging_configurations(scene, *placed.grasps), 4))
     assert len(found) == 4
     geometry = build_geometry(scene.robot, scene.loaded, with_bin=False)
     inner = scene.loaded.cell.bin.inner

@@ -54,7 +54,7 @@ def choose_scan(placed: PlacedScene, evaluator: Evaluator) -> ScanChoice | None:
     ScanChoice or None
         None if no configuration images the bin.
     """
-    found = imaging_configurations(placed.scene, placed.Q, placed.frame)
+    found = imaging_configurations(placed.scene, *placed.grasps)
     finalists = list(islice(found, FINALISTS))
     if not finalists:
         return None

@@ -83,6 +83,37 @@ def test_fast_joints_are_followed_in_smaller_steps():
     assert found > 3
 
 
+def test_many_approaches_are_those_of_one_grasp_at_a_time():
+    """Also where the branch ends, which is seen from the kinematics of its far end."""
+    scene = scene_of("ur5-eye-in-hand")
+    approach = approach_of(scene)
+    rng = np.random.default_rng(4)
+    # Stretched elbows: many a way back leads out of reach.
+    Q = grasps(scene, 200)
+    Q[100:, 2] = rng.uniform(-0.4, 0.4, 100)
+    T = scene.kinematics.forward_many(Q)
+    ways = approach.of_many(T, Q)
+    alone = [approach.of(grasp, q) for grasp, q in zip(T, Q, strict=True)]
+    assert [way is None for way in ways] == [way is None for way in alone]
+    assert 20 < sum(way is None for way in ways) < 180
+    for way, other in zip(ways, alone, strict=True):
+        if way is not None and other is not None:
+            np.testing.assert_allclose(way, other, atol=1e-3)
+
+
+def test_ways_are_verified_together_as_one_by_one():
+    """Ways through the cell, of one configuration and of several, free or not."""
+    scene = scene_of("ur5-eye-in-hand")
+    Q = grasps(scene, 120)
+    found = approach_of(scene).of_many(scene.kinematics.forward_many(Q), Q)
+    ways = [way for way in found if way is not None and scene.checker.is_free(way[-1])]
+    ways[::7] = [way[-1:] for way in ways[::7]]
+    together = scene.motions.ways_are_verified(ways)
+    assert together.tolist() == [scene.motions.path_is_verified(way) for way in ways]
+    assert 0 < together.sum() < len(ways)
+    assert together[::7].all()
+
+
 def test_a_branch_that_ends_is_no_approach():
     """The toy's arm cannot go back by more than it can stretch."""
     scene = scene_of("planar-toy")

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from reachmap._typing import FloatArray
+from reachmap._typing import BoolArray, FloatArray
 from reachmap.core.kinematics.kinematics import Kinematics
 from reachmap.core.planning.motion import MotionChecker
 from reachmap.geometry import rotation_angle
@@ -82,11 +82,25 @@ class StraightApproach:
         back, is_met = self._kinematics.follow_many(
             Q, T, largest_step_rad=_LARGEST_STEP_RAD
         )
-        ways: list[FloatArray | None] = []
-        for k, q in enumerate(Q):
-            way = back[k] if is_met[k] else self._in_smaller_steps(T_base_tcp[k], q)
-            ways.append(None if way is None else np.vstack([way[::-1], q]))
+        hopeful = is_met | self._has_solution(T[:, -1], ~is_met)
+        ways: list[FloatArray | None] = [None] * len(Q)
+        for k in np.flatnonzero(hopeful).tolist():
+            way = back[k] if is_met[k] else self._in_smaller_steps(T_base_tcp[k], Q[k])
+            if way is not None:
+                ways[k] = np.vstack([way[::-1], Q[k]])
         return ways
+
+    def _has_solution(self, T: FloatArray, among: BoolArray) -> BoolArray:
+        """Which of some poses may be met on some branch, (n, 4, 4) to (n,).
+
+        Where none is, no branch leads there, and following one to its end is saved.
+        """
+        if not among.any() or not self._kinematics.complete:
+            return among
+        _, pose = self._kinematics.solve_many(T[among], windings=False)
+        found = np.zeros(len(T), bool)
+        found[np.flatnonzero(among)[pose]] = True
+        return found
 
     def _in_smaller_steps(
         self, T_base_tcp: FloatArray, q_grasp: FloatArray

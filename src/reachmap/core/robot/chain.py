@@ -51,9 +51,12 @@ class SerialChain:
     offsets_base: FloatArray
     R_base_tcp_zero: FloatArray
     _parts: FloatArray = field(init=False, repr=False)
+    _sliding: tuple[int, ...] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
+        sliding = tuple(np.flatnonzero(~self.is_revolute).tolist())
         object.__setattr__(self, "_parts", _joint_parts(self.T_fixed[:-1]))
+        object.__setattr__(self, "_sliding", sliding)
 
     @classmethod
     def from_robot(cls, robot: RobotModel) -> SerialChain:
@@ -158,10 +161,11 @@ class SerialChain:
     def joint_frames_many(self, Q: FloatArray) -> FloatArray:
         """Frames of the joints in robot_base, z along the axis, (n, dof, 4, 4)."""
         steps = self._steps(np.asarray(Q, float))
-        frames = [steps[0]]
-        for step in steps[1:]:
-            frames.append(frames[-1] @ step)
-        return np.stack(frames, axis=1)
+        frames = np.empty((len(Q), self.dof, 4, 4))
+        frames[:, 0] = steps[0]
+        for k in range(1, self.dof):
+            np.matmul(frames[:, k - 1], steps[k], out=frames[:, k])
+        return frames
 
     @staticmethod
     def joint_rotations(model: Any) -> FloatArray:
@@ -201,7 +205,7 @@ class SerialChain:
         steps += np.sin(Q.T)[:, :, None] * C[:, None]
         steps += A[:, None]
         steps = steps.reshape(self.dof, len(Q), 4, 4)
-        for k in np.flatnonzero(~self.is_revolute):
+        for k in self._sliding:
             steps[k] = self.T_fixed[k]
             steps[k, :, :, 3] += Q[:, k, None] * self.T_fixed[k, :, 2]
         return np.asarray(steps)

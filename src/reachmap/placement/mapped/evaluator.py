@@ -294,7 +294,7 @@ def start_of(
         return wanted, ""
     if q is not None:
         return None, f"{checker.body_pairs[pair]} at the scan configuration"
-    image = next(imaging_configurations(placed.scene, placed.Q, placed.frame), None)
+    image = next(imaging_configurations(placed.scene, *placed.grasps), None)
     return image, UNSEEN if image is None else ""
 
 

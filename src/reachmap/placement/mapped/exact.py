@@ -1,14 +1,15 @@
 """The exact score of a bin pose: roadmap to a sample of frames, bin in the scene.
 
-What a score costs is mostly straight approaches, so they are looked at lazily: one
-branch of each frame's inverse kinematics first, the others only if the frame is not
-reached.
+What a score costs is mostly collision checks and straight approaches, so they are
+looked at lazily: one free branch of each frame's inverse kinematics first, the others
+only if the frame is not reached.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
@@ -132,11 +133,6 @@ class PlacedScene:
     scene : Scene
     T : array, shape (frames, 4, 4)
         T_base_tcp; where rolls do not matter, of the first roll.
-    Q : array, shape (branches, dof)
-        Free configurations of all frames, those nearest to the cell's own scan
-        configuration first in each frame [rad].
-    frame : int array, shape (branches,)
-        Frame of each, rising.
     """
 
     def __init__(
@@ -165,24 +161,53 @@ class PlacedScene:
         self._first: _Goals | None = None
 
     def _survey(self) -> None:
+        """Solve for all frames, and find the first free branch of each.
+
+        Branches nearest to the cell's own scan configuration come first. Frames that
+        the tool cannot take have no free branch, and none is looked for.
+        """
         scene = self.scene
         Q, rolled = scene.kinematics.solve_many(
             self._rolled, windings=False, near=scene.scan_configuration
         )
         frame = rolled // self._rolls
         self._has_ik = np.bincount(frame, minlength=len(self.T)) > 0
-        free = scene.checker.free_mask(Q)
-        Q, frame, rolled = Q[free], frame[free], rolled[free]
         away = np.round(np.linalg.norm(Q - scene.scan_configuration, axis=1), 9)
         order = np.lexsort((away, frame))
-        self.Q, self.frame = Q[order], frame[order]
-        self._row = rolled[order]
-        self._begin = np.searchsorted(self.frame, np.arange(len(self.T) + 1))
+        self._Q, self._frame, self._row = Q[order], frame[order], rolled[order]
+        bounds = np.searchsorted(self._frame, np.arange(len(self.T) + 1))
+        self._end = bounds[1:]
+        can = self._sample.weight > 0
+        self._first_free = np.where(can, bounds[:-1], self._end)
+        self._skip_blocked(self._first_free, np.flatnonzero(can))
+
+    def _skip_blocked(self, rows: IntArray, frames: IntArray) -> None:
+        """Move the rows of some frames on, each to its next free branch or its end."""
+        is_free = self.scene.checker.is_free
+        for frame in frames.tolist():
+            row, end = int(rows[frame]), int(self._end[frame])
+            while row < end and not is_free(self._Q[row]):
+                row += 1
+            rows[frame] = row
+
+    @cached_property
+    def grasps(self) -> tuple[FloatArray, IntArray]:
+        """Free configurations of all frames, and the frame of each.
+
+        Returns
+        -------
+        Q : array, shape (n, dof)
+            [rad].
+        frame : int array, shape (n,)
+            Rising.
+        """
+        free = self.scene.checker.free_mask(self._Q)
+        return self._Q[free], self._frame[free]
 
     @property
     def bound(self) -> float:
         """Upper bound of the score: weight of frames with a free configuration [%]."""
-        return 100.0 * float(self._sample.weight @ (np.diff(self._begin) > 0))
+        return 100.0 * float(self._sample.weight @ (self._first_free < self._end))
 
     @property
     def reachable_share(self) -> float:
@@ -229,14 +254,12 @@ class PlacedScene:
 
     def _first_goals(self, above: float) -> _Goals:
         """One free approach for each frame that has one, unless too few have."""
-        goals = _Goals(tried=self._begin[:-1].copy(), bound=self.bound)
-        branches = np.diff(self._begin)
-        # Those with few branches first: too low a bound shows sooner.
-        order = np.argsort(branches, kind="stable")
-        pending = order[np.searchsorted(branches[order], 1) :]
+        goals = _Goals(tried=self._first_free.copy(), bound=self.bound)
+        pending = np.flatnonzero(goals.tried < self._end)
         while len(pending):
             missed = pending[~self._try_next(goals, pending)]
-            ended = goals.tried[missed] == self._begin[missed + 1]
+            self._skip_blocked(goals.tried, missed)
+            ended = goals.tried[missed] == self._end[missed]
             goals.bound -= 100.0 * float(self._sample.weight[missed[ended]].sum())
             if goals.bound <= above:
                 break
@@ -246,10 +269,12 @@ class PlacedScene:
     def _with_other_branches(self, first: _Goals, connection: Connection) -> _Goals:
         """Goals of all branches of the frames that were not reached."""
         every = first.copy()
-        missed = np.ones(len(self.T), bool)
+        missed = every.tried < self._end
         missed[connection.roadmap.frames_reached()] = False
         pending = np.flatnonzero(missed)
-        while len(pending := pending[every.tried[pending] < self._begin[pending + 1]]):
+        while len(pending):
+            self._skip_blocked(every.tried, pending)
+            pending = pending[every.tried[pending] < self._end[pending]]
             self._try_next(every, pending)
         return every
 
@@ -257,14 +282,14 @@ class PlacedScene:
         """Look at the next branch of some frames; True where its approach is free."""
         rows = goals.tried[frames]
         goals.tried[frames] += 1
-        ways = self._approach.of_many(self._rolled[self._row[rows]], self.Q[rows])
-        free, motions = np.zeros(len(frames), bool), self.scene.motions
-        for k, (frame, way) in enumerate(zip(frames.tolist(), ways, strict=True)):
-            if way is None or (len(way) > 1 and not motions.way_is_verified(way)):
-                continue
-            free[k] = True
-            goals.way.append(way)
-            goals.frame.append(frame)
+        ways = self._approach.of_many(self._rolled[self._row[rows]], self._Q[rows])
+        followed = [(k, way) for k, way in enumerate(ways) if way is not None]
+        free = np.zeros(len(frames), bool)
+        free[[k for k, _ in followed]] = self.scene.motions.ways_are_verified(
+            [way for _, way in followed]
+        )
+        goals.way += [way for k, way in followed if free[k]]
+        goals.frame += frames[free].tolist()
         return free
 
     def _connect(self, q: FloatArray, goals: _Goals, enough: float) -> Connection:
@@ -331,7 +356,7 @@ class _Goals:
     frame : list of int
         Frame of each.
     tried : int array, shape (frames,)
-        Next row of the branches for each frame.
+        Branch of each frame to be looked at next.
     bound : float
         What the frames count for that have a goal or were not looked at [percent].
     """
