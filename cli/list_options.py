@@ -122,7 +122,7 @@ list_options = compose(
         type=click.IntRange(1, 64),
         default=1,
         show_default=True,
-        help="Blend the costs of the N nearest test points.",
+        help="Blend the costs of like orientations at the N nearest test points.",
     ),
     click.option(
         "--roll",

@@ -30,6 +30,7 @@ from reachmap.ranking import (
 from reachmap.ranking.lookup.approach import tcp_rotation
 from reachmap.ranking.lookup.costs import outside_map
 from reachmap.ranking.lookup.order import stable_order
+from reachmap.ranking.lookup.settings import Roll
 from reachmap.ranking.lookup.table import quaternion_angle
 from tests.support.optional import present
 from tests.support.ranking_maps import make_bin_map
@@ -224,23 +225,80 @@ def test_neighbours_are_blended_by_inverse_distance():
     blended = ranker.rank(point[None], down, neighbours=2)
     terms = [ranker.rank(p[None], down).terms[0, :3] for p in (a, b)]
     expected = 0.75 * terms[0] + 0.25 * terms[1]
-    np.testing.assert_allclose(blended.terms[0, :3], expected)
+    # Orientations a step away count a few millionths.
+    np.testing.assert_allclose(blended.terms[0, :3], expected, rtol=1e-3)
     on_point = ranker.rank(a[None], down, neighbours=5)
     np.testing.assert_allclose(on_point.terms[0, :3], terms[0], rtol=1e-4)
 
 
-def test_losing_a_neighbour_never_makes_a_grasp_cheaper():
-    """An unreachable neighbour counts with the greatest cost; the nearest decides."""
+def test_an_unreachable_neighbour_has_no_cost_to_blend():
+    """What is left is blended, and the nearest test grasp still decides."""
     m = all_reachable()
     found, status = m.path_found.copy(), m.status.copy()
     found[0, 1, 2], status[0, 1, 2] = 0, Status.NO_IK
-    lost = dataclasses.replace(m, path_found=found, status=status)
-    point = (0.7 * m.position[0, 1, 1] + 0.3 * m.position[0, 1, 2])[None]
+    lost = Ranker(dataclasses.replace(m, path_found=found, status=status))
+    a, b = m.position[0, 1, 1], m.position[0, 1, 2]
     down = np.array([[0.0, 0.0, -1.0]])
-    before, after = (Ranker(x).rank(point, down, neighbours=4) for x in (m, lost))
-    assert after.cost[0] > before.cost[0]
-    near_lost = (0.3 * m.position[0, 1, 1] + 0.7 * m.position[0, 1, 2])[None]
-    assert not Ranker(lost).rank(near_lost, down, neighbours=4).reachable[0]
+    blended = lost.rank((0.7 * a + 0.3 * b)[None], down, neighbours=2)
+    alone = lost.rank(a[None], down)
+    np.testing.assert_allclose(blended.terms[0, :3], alone.terms[0, :3], rtol=1e-3)
+    near_lost = lost.rank((0.3 * a + 0.7 * b)[None], down, neighbours=4)
+    assert not near_lost.reachable[0]
+
+
+@pytest.mark.parametrize("free", [True, False])
+@pytest.mark.parametrize("same_everywhere", [True, False])
+def test_blended_costs_are_those_of_a_plain_loop(free, same_everywhere):
+    """Over nearest points and, by a kernel, over like directions or orientations."""
+    bin_map = make_bin_map(seed=3, reachable=0.8)
+    if not same_everywhere:
+        turned = bin_map.quaternion_wxyz.copy()
+        turned[0, 0, 0] = turned[0, 0, 0][::-1]
+        bin_map = dataclasses.replace(bin_map, quaternion_wxyz=turned)
+    ranker = Ranker(bin_map)
+    table, rng = ranker.table, np.random.default_rng(0)
+    assert table.same_everywhere == same_everywhere
+    points = table.points[rng.integers(len(table.points), size=20)]
+    points = points + rng.uniform(-0.01, 0.01, points.shape)
+    R = Rotation.from_euler("xyz", rng.normal(0, 0.2, (20, 3))).as_matrix()
+    down = table.axes[0, 0] @ np.eye(3)
+    R = R @ rotation_between(axis_vector(bin_map.approach_axis), down)
+    roll: Roll = "free" if free else "fixed"
+    blended = ranker.rank(points, rotations=R, neighbours=3, roll=roll)
+    nearest = ranker.rank(points, rotations=R, roll=roll)
+    np.testing.assert_array_equal(blended.reachable, nearest.reachable)
+    assert blended.reachable.sum() >= 5
+    axes = R @ axis_vector(bin_map.approach_axis)
+    spacing = table.spacing_rad[0 if free else 1]
+    for n in np.flatnonzero(blended.reachable):
+        distance = np.linalg.norm(table.points - points[n], axis=1)
+        total, blend = 0.0, np.zeros(3)
+        for p in np.argsort(distance)[:3]:
+            angle, terms = [], []
+            for o in range(table.axes.shape[1]):
+                stored = rotation_from_quaternion_wxyz(table.quaternions[p, o])
+                turn = rotation_angle(R[n], stored)
+                angle.append(
+                    float(direction_angle(axes[n], table.axes[p, o]) if free else turn)
+                )
+                terms.append(table.normalised[p, o])
+            if free and same_everywhere:
+                # Of the rolls of one direction the cheapest.
+                order = sorted(
+                    range(len(terms)), key=lambda o: np.nan_to_num(sum(terms[o]), nan=9)
+                )
+                kept: list[int] = []
+                for o in order:
+                    alike = direction_angle(table.axes[p, o], table.axes[p, kept])
+                    if not kept or alike.min() > 1e-6:
+                        kept.append(o)
+                angle, terms = [angle[o] for o in kept], [terms[o] for o in kept]
+            for a, values in zip(angle, terms, strict=True):
+                like = np.cos(a) - np.cos(min(angle))
+                weight = np.exp(like / (0.2 * spacing) ** 2) / distance[p]
+                if np.isfinite(values).all():
+                    total, blend = total + weight, blend + weight * values
+        np.testing.assert_allclose(blended.terms[n, :3], blend / total, rtol=1e-6)
 
 
 def test_more_neighbours_than_points():
@@ -249,7 +307,7 @@ def test_more_neighbours_than_points():
     point = ranker.table.points[:1]
     down = np.array([[0.0, 0.0, -1.0]])
     one, many = (ranker.rank(point, down, neighbours=k) for k in (1, 64))
-    np.testing.assert_allclose(one.cost, many.cost)
+    np.testing.assert_allclose(one.cost, many.cost, rtol=1e-4)
 
 
 def test_outside_the_map_sideways_above_and_below():

@@ -14,14 +14,9 @@ import numpy as np
 
 from reachmap._typing import BoolArray, FloatArray, IntArray
 from reachmap.errors import SettingsError
-from reachmap.ranking.lookup.matching import (
-    Matches,
-    NearestPoints,
-    Queries,
-    match_at,
-    tie_costs,
-)
+from reachmap.ranking.lookup.matching import Matches, NearestPoints, Queries
 from reachmap.ranking.lookup.settings import ALIKE_STEPS, MARGINS, RankSettings
+from reachmap.ranking.lookup.surroundings import directions_of, turn_cosines
 from reachmap.ranking.lookup.table import TERMS, GraspTable
 from reachmap.ranking.terms import PLANNING, CycleSeconds
 
@@ -38,14 +33,11 @@ class Columns:
     weights : array, shape (k,)
     values : array, shape (points, orientations, k)
         Before weighting; NaN where unreachable.
-    worst : array, shape (k,)
-        Greatest of each, which an unreachable neighbour counts with.
     """
 
     names: tuple[str, ...]
     weights: FloatArray
     values: FloatArray
-    worst: FloatArray
 
     def costs(self) -> FloatArray:
         """Weighted sum for every test grasp, shape (points, orientations).
@@ -70,7 +62,6 @@ def columns_of(table: GraspTable, settings: RankSettings) -> Columns:
         names=TERMS,
         weights=np.asarray(settings.weights, float),
         values=table.normalised,
-        worst=table.maxima / table.scale,
     )
     asked = [name for name in MARGINS if settings.margins.get(name)]
     if not asked:
@@ -85,10 +76,6 @@ def columns_of(table: GraspTable, settings: RankSettings) -> Columns:
         names=(*TERMS, *asked),
         weights=np.append(columns.weights, [settings.margins[k] for k in asked]),
         values=np.concatenate([columns.values, values], axis=-1),
-        worst=np.append(
-            columns.worst,
-            values.max(axis=(0, 1), where=table.reachable[..., None], initial=0.0),
-        ),
     )
 
 
@@ -116,7 +103,6 @@ def _seconds(table: GraspTable, cycle: CycleSeconds) -> Columns:
         names=(*cycle.names, PLANNING),
         weights=np.ones(values.shape[-1]),
         values=values,
-        worst=np.nan_to_num(values).max(axis=(0, 1)),
     )
 
 
@@ -126,6 +112,10 @@ SIDEWAYS_TOLERANCE_M: Final = 1e-3
 VERTICAL_TOLERANCE_M: Final = 0.05
 BOTTOM_TOLERANCE_M: Final = 5e-3
 MIN_DISTANCE_M: Final = 1e-6
+# Width of the kernel of blended costs in spacings of the orientations. Chosen on the
+# machine door of benchmarks/hard_cells, whose costs turn with the direction: wider
+# ones mix ways that the arm takes differently (docs/explanation/prediction.md).
+BLEND_STEPS: Final = 0.2
 
 
 def outside_map(points: FloatArray, nearest: IntArray, table: GraspTable) -> BoolArray:
@@ -191,24 +181,24 @@ def likeness_terms(matches: Matches, free: BoolArray, table: GraspTable) -> Floa
 def blended_terms(
     phi: FloatArray,
     queries: Queries,
-    matches: Matches,
     table: GraspTable,
     tree: NearestPoints,
     columns: Columns,
     neighbours: int,
 ) -> FloatArray:
-    """Terms of test grasps blended over the k nearest test points by inverse distance.
+    """Terms blended over the reachable test grasps around each grasp.
 
-    Whether a grasp is reachable is still decided by its nearest test grasp alone. An
-    unreachable neighbour counts with the greatest cost there is in each term: were it
-    left out, a grasp would become cheaper when a neighbour is lost.
+    Those of the k nearest test points count by the inverse of their distance, and at
+    each point those of like orientation by a von Mises-Fisher kernel. Whether a grasp
+    is reachable is still decided by its nearest test grasp alone, and how likely by
+    its surroundings: what is unreachable has no cost to blend.
 
     Parameters
     ----------
     phi : array, shape (n, k)
         Terms of the nearest test grasps; NaN where unreachable.
-    queries, matches, table, tree
-        The grasps, their nearest test grasps, and where to look.
+    queries, table, tree
+        The grasps, the test grasps, and where to look.
     columns : Columns
     neighbours : int
 
@@ -217,19 +207,57 @@ def blended_terms(
     array, shape (n, k)
         NaN where the nearest test grasp is unreachable.
     """
-    distance, point = tree.in_order(queries.points, neighbours + 1)
-    weight = 1.0 / np.maximum(matches.distance, MIN_DISTANCE_M)
-    total, blend = weight.copy(), phi * weight[:, None]
-    tie_cost = tie_costs(columns.costs())
-    # The matched point is one of the nearest; the others follow by distance.
-    used = np.zeros(len(queries), np.int64)
-    for column in range(point.shape[1]):
-        other = (point[:, column] != matches.point) & (used < neighbours - 1)
-        used += other
-        near = match_at(queries, table, point[:, column], distance[:, column], tie_cost)
-        terms = columns.values[near.point, near.orientation]
-        terms = np.where(np.isnan(terms), columns.worst, terms)
-        weight = np.where(other, 1.0 / np.maximum(near.distance, MIN_DISTANCE_M), 0.0)
-        total += weight
-        blend += terms * weight[:, None]
-    return np.asarray(blend / total[:, None])
+    blended = phi.copy()
+    for free in (True, False):
+        rows = np.flatnonzero((queries.free == free) & ~np.isnan(phi[:, 0]))
+        if rows.size:
+            some = queries.take(rows)
+            around = tree.in_order(some.points, neighbours)
+            terms = _blend(some, table, columns, *around, free=free)
+            known = ~np.isnan(terms[:, 0])
+            blended[rows[known]] = terms[known]
+    return blended
+
+
+def _blend(
+    queries: Queries,
+    table: GraspTable,
+    columns: Columns,
+    distance: FloatArray,
+    point: IntArray,
+    *,
+    free: bool,
+) -> FloatArray:
+    """Blended terms of grasps whose roll is all free or all fixed; NaN: none around."""
+    vectors = queries.axes if free else queries.quaternions
+    stored = table.axes if free else table.quaternions
+    stored, values = stored[:1] if table.same_everywhere else stored, columns.values
+    if free and table.same_everywhere:
+        stored, values = _by_direction(stored, columns)
+    width = BLEND_STEPS * float(table.spacing_rad[0 if free else 1])
+    total = np.zeros((len(queries), 1))
+    blend = np.zeros((len(queries), values.shape[-1]))
+    for at, far in zip(point.T, distance.T, strict=True):
+        cosine = turn_cosines(vectors, stored, at, free=free)
+        like = np.exp((cosine - cosine.max(axis=1, keepdims=True)) / width**2)
+        reached = ~np.isnan(values[at, :, 0])
+        weight = like * reached / np.maximum(far, MIN_DISTANCE_M)[:, None]
+        total += weight.sum(axis=1, keepdims=True)
+        blend += np.einsum("ng,ngk->nk", weight, np.nan_to_num(values[at]))
+    return np.asarray(
+        np.where(total > 0, blend / np.where(total > 0, total, 1), np.nan)
+    )
+
+
+def _by_direction(axes: FloatArray, columns: Columns) -> tuple[FloatArray, FloatArray]:
+    """Directions (1, g, 3), and terms of the cheapest roll of each (points, g, k)."""
+    first, group = directions_of(axes[0])
+    cost = columns.costs()
+    best = np.stack(
+        [
+            rolls[np.argmin(cost[:, rolls], axis=1)]
+            for rolls in (np.flatnonzero(group == g) for g in range(len(first)))
+        ],
+        axis=1,
+    )
+    return axes[:, first], np.take_along_axis(columns.values, best[..., None], axis=1)

@@ -345,13 +345,7 @@ class Ranker:
         phi = columns.values[matches.point, matches.orientation]
         if settings.neighbours > 1:
             phi = blended_terms(
-                phi,
-                queries,
-                matches,
-                table,
-                self._tree,
-                columns,
-                settings.neighbours,
+                phi, queries, table, self._tree, columns, settings.neighbours
             )
         unlike = settings.likeness * likeness_terms(matches, queries.free, table)
         terms = np.insert(phi * columns.weights, 3, unlike, axis=1)
