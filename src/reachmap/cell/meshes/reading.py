@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Sequence
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
@@ -19,11 +20,12 @@ from reachmap.cell.meshes.ply import ply_triangles
 from reachmap.cell.meshes.polygons import MeshError, fans
 from reachmap.cell.model.shapes import TriangleMesh
 
-__all__ = ["KEPT", "KEPT_BYTES", "MeshError", "read_mesh"]
+__all__ = ["MeshError", "read_mesh"]
 
-# Meshes that are kept, and the size of their files: 64 MiB at most. Collision meshes of
+# Meshes that are kept, and the size of their files: 128 MiB at most. Collision meshes of
 # example-robot-data are seldom larger (10 of 171).
-KEPT, KEPT_BYTES = 64, 1 << 20
+KEPT, KEPT_BYTES = 128, 1 << 20
+UNSCALED = (1.0, 1.0, 1.0)
 _STL_VERTEX = re.compile(rb"\bvertex\s+(\S+)\s+(\S+)\s+(\S+)", re.IGNORECASE)
 _OTHERS = {
     ".glb": "glTF", ".gltf": "glTF", ".step": "STEP", ".stp": "STEP",
@@ -31,7 +33,7 @@ _OTHERS = {
 }  # fmt: skip
 
 
-def read_mesh(data: bytes, suffix: str) -> TriangleMesh:
+def read_mesh(data: bytes, suffix: str, scale: Any = 1.0) -> TriangleMesh:
     """Read the triangles of a mesh file.
 
     Parameters
@@ -40,11 +42,14 @@ def read_mesh(data: bytes, suffix: str) -> TriangleMesh:
         The whole file.
     suffix : str
         ``.stl``, ``.obj``, ``.dae`` or ``.ply``; case does not matter.
+    scale : float or array, shape (3,)
+        Factor of all vertices, or one for each axis.
 
     Returns
     -------
     TriangleMesh
-        In the file's own unit; COLLADA states its unit, and is in metres.
+        In the file's own unit times the scale; COLLADA states its unit, and is in
+        metres. The same object for the same small file and scale.
 
     Raises
     ------
@@ -52,11 +57,14 @@ def read_mesh(data: bytes, suffix: str) -> TriangleMesh:
         The file has no triangles, is truncated, names vertices that it does not have,
         or holds numbers that are not finite.
     """
+    factors = tuple(np.broadcast_to(np.asarray(scale, float), 3).tolist())
     read = _kept if len(data) <= KEPT_BYTES else _read
-    return read(data, suffix)
+    return read(data, suffix, factors)
 
 
-def _read(data: bytes, suffix: str) -> TriangleMesh:
+def _read(data: bytes, suffix: str, factors: tuple[float, ...]) -> TriangleMesh:
+    if factors != UNSCALED:
+        return read_mesh(data, suffix).scaled(factors)
     readers: dict[str, Callable[[bytes], tuple[FloatArray, IntArray]]] = {
         ".stl": _stl_triangles,
         ".obj": _obj_triangles,

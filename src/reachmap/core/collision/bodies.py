@@ -10,7 +10,6 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
-from functools import lru_cache
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -21,11 +20,11 @@ from reachmap.cell.files.collisions import LinkShape
 from reachmap.cell.files.files import body_key
 from reachmap.cell.files.srdf import parse_srdf
 from reachmap.cell.files.urdf import UrdfDescription
-from reachmap.cell.meshes.reading import KEPT, KEPT_BYTES, MeshError, read_mesh
+from reachmap.cell.meshes.reading import MeshError, read_mesh
 from reachmap.cell.model.bin_parts import BinPart, bin_parts
 from reachmap.cell.model.bodies import BinSpec
 from reachmap.cell.model.fields import Shape
-from reachmap.cell.model.shapes import Solid, TriangleMesh
+from reachmap.cell.model.shapes import Solid
 from reachmap.cell.pick_cycle import PART
 from reachmap.core.collision.held_part import HeldPart
 from reachmap.core.collision.shapes import coal_shape
@@ -247,25 +246,12 @@ def _body_shape(loaded: LoadedCell, name: str, shape: Shape) -> Solid:
 
 def _read_mesh(loaded: LoadedCell, key: str, owner: str, scale: Any) -> Solid:
     path = loaded.mesh_paths[key]
-    factors = tuple(np.broadcast_to(np.asarray(scale, float), 3).tolist())
     try:
-        data = path.read_bytes()
-        scaled = _kept_mesh if len(data) <= KEPT_BYTES else _scaled_mesh
-        return scaled(data, path.suffix, factors)
+        return read_mesh(path.read_bytes(), path.suffix, scale)
     except (OSError, MeshError) as error:
         raise SceneError(
             f"{owner}: {path.name} cannot be read as a mesh ({error})"
         ) from error
-
-
-def _scaled_mesh(
-    data: bytes, suffix: str, factors: tuple[float, float, float]
-) -> TriangleMesh:
-    return read_mesh(data, suffix).scaled(factors)
-
-
-# The same object for the same file: scenes of one cell share their meshes.
-_kept_mesh = lru_cache(maxsize=KEPT)(_scaled_mesh)
 
 
 class _Builder:

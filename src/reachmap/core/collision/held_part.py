@@ -86,7 +86,7 @@ def _solid(loaded: LoadedCell, key: str, spec: PartSpec) -> Solid:
         return spec.shape
     path = loaded.mesh_paths[body_key(key, mesh.file)]
     try:
-        return read_mesh(path.read_bytes(), path.suffix).scaled(mesh.scale)
+        return read_mesh(path.read_bytes(), path.suffix, mesh.scale)
     except (OSError, MeshError) as error:
         raise SceneError(f"part: {path.name} is no mesh ({error})") from error
 

@@ -269,7 +269,7 @@ def _points_of(cell: Cell, item: LinkShape) -> FloatArray:
         surface = triangles_of(item.shape)
     else:
         path = _mesh_path(cell, item.mesh)
-        surface = read_mesh(path.read_bytes(), path.suffix).scaled(item.scale)
+        surface = read_mesh(path.read_bytes(), path.suffix, item.scale)
     return _edge_points(surface.vertices[surface.triangles])
 
 
