@@ -30,8 +30,7 @@ from reachmap.runtime.run import run_scan
 from reachmap.sampling.frames import approach_distance_m
 from reachmap.scans.bin_roadmap import grasp_grid, roadmap_of
 from reachmap.scans.bin_scan import bin_work, pairs_of_fillings, plan_grasps
-from reachmap.scans.cycle.cell_warnings import drop_off_warnings
-from reachmap.scans.cycle.part_fit import require_room_for_part
+from reachmap.scans.cycle.cell_checks import drop_off_warnings, require_room_for_part
 from reachmap.scans.cycle.scenes import CycleScenes, stages_of
 from reachmap.scans.document import checking_settings, scan_document
 from reachmap.scans.ik_survey import survey_frames

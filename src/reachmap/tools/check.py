@@ -16,7 +16,7 @@ from reachmap.core.scene import Scene
 from reachmap.geometry import AXES, inverse_transform, tilt_rad
 from reachmap.placement.mapped.imaging import picture_of
 from reachmap.sampling.frames import approach_distance_m, below_rim_m
-from reachmap.scans.cycle.cell_warnings import cycle_warnings
+from reachmap.scans.cycle.cell_checks import cycle_warnings
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

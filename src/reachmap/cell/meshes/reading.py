@@ -22,8 +22,8 @@ from reachmap.cell.model.shapes import TriangleMesh
 
 __all__ = ["MeshError", "read_mesh"]
 
-# Meshes that are kept, and the size of their files: 128 MiB at most. Collision meshes of
-# example-robot-data are seldom larger (10 of 171).
+# Meshes that are kept, and the size of their files: 128 MiB at most. Collision meshes
+# of example-robot-data are seldom larger (10 of 171).
 KEPT, KEPT_BYTES = 128, 1 << 20
 UNSCALED = (1.0, 1.0, 1.0)
 _STL_VERTEX = re.compile(rb"\bvertex\s+(\S+)\s+(\S+)\s+(\S+)", re.IGNORECASE)

@@ -1,8 +1,9 @@
-"""Whether the part of a cell fits in its bin at all."""
+"""Checks of the pick cycle before any scan: the part fits, drop-offs are in reach."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,8 +15,12 @@ from reachmap.core.collision.static_bodies import PlacedBodies, PlacedBody
 from reachmap.errors import SceneError
 from reachmap.geometry import inverse_transform, transform_from_parts
 from reachmap.sampling.frames import bin_test_frames
+from reachmap.scans.cycle.places import ways_to_place
 from reachmap.scans.cycle.scenes import CycleScenes
 from reachmap.scans.rolls import RollGroups
+
+if TYPE_CHECKING:
+    from reachmap.cell.loading import LoadedCell
 
 
 def require_room_for_part(scenes: CycleScenes) -> None:
@@ -89,3 +94,31 @@ def _wall_around(scenes: CycleScenes, T_bin_tcp: FloatArray, wanted: BoolArray) 
         if hit < 0:
             return ""
     return walls.bodies[hit].name
+
+
+def cycle_warnings(loaded: LoadedCell) -> list[str]:
+    """Warnings about a part that does not fit, and drop-offs that are out of reach."""
+    scenes = CycleScenes.of(loaded)
+    if scenes is None:
+        return []
+    try:
+        scenes.home()
+        require_room_for_part(scenes)
+    except SceneError as error:
+        return list(error.lines)
+    return drop_off_warnings(scenes)
+
+
+def drop_off_warnings(scenes: CycleScenes) -> list[str]:
+    """Warnings about drop-offs at which nothing can be put down."""
+    loaded = scenes.empty.loaded
+    warnings = []
+    for spec in loaded.cell.drop_offs:
+        ways, pair = ways_to_place(scenes, spec)
+        if not ways:
+            cause = pair or "out of reach, or the straight approach is"
+            warnings.append(
+                f"{loaded.source}: drop_off: nothing can be put down at "
+                f"{spec.name!r} ({cause})"
+            )
+    return warnings
