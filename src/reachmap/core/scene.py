@@ -145,12 +145,6 @@ class Scene:
     ) -> Scene:
         """Scene of a cell, built once per process as long as the cell is the same.
 
-        Parameters
-        ----------
-        loaded : LoadedCell
-        with_bin : bool
-        load : Load
-
         Raises
         ------
         SceneError

@@ -90,10 +90,6 @@ def ranking_chart(
     top : int
         How many of the first grasps are averaged.
     subtitle : str
-
-    Returns
-    -------
-    Figure
     """
     if not groups or top < 1:
         raise SettingsError("a chart needs grasps, and a top of 1 or more")

@@ -43,10 +43,6 @@ LEFT, BOTTOM, SIDE, GAP, DIAGRAM = 0.75, 1.0, 3.3, 0.85, 2.4
 def validation_chart(validation: Validation) -> Figure:
     """Draw predicted against measured J, the reliability of probabilities, and orders.
 
-    Parameters
-    ----------
-    validation : Validation
-
     Returns
     -------
     Figure

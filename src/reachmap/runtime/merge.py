@@ -27,10 +27,6 @@ def merge_journals(
     overwrite : bool
         Replace ``output``.
 
-    Returns
-    -------
-    Outcome
-
     Raises
     ------
     OutputError

@@ -140,12 +140,7 @@ def merge_coordinates(axes: Sequence[FloatArray]) -> FloatArray:
 
 
 def stitch(lattices: Sequence[Lattice]) -> Stitching:
-    """Join lattices into one; points are matched by position, never by index.
-
-    Parameters
-    ----------
-    lattices : sequence of Lattice
-    """
+    """Join lattices into one; points are matched by position, never by index."""
     union = Lattice(
         x=merge_coordinates([item.x for item in lattices]),
         y=merge_coordinates([item.y for item in lattices]),

@@ -90,10 +90,6 @@ class ArtefactInfo:
 def info(path: str | Path) -> ArtefactInfo:
     """Summarise an artefact, or what the journal of a run holds so far.
 
-    Parameters
-    ----------
-    path : Path
-
     Raises
     ------
     MapFileError

@@ -23,10 +23,6 @@ def merge(
         The artefact.
     overwrite : bool
         Replace ``output``.
-
-    Returns
-    -------
-    Outcome
     """
     output = Path(output)
     check_outputs([output], overwrite=overwrite, inputs=shards)

@@ -24,12 +24,6 @@ def random_grasps(bin_map: BinMap, count: int, seed: int) -> GraspList:
     larger pitch either way. Directions are uniform over the sphere between the least
     and the greatest tilt of the map's orientations.
 
-    Parameters
-    ----------
-    bin_map : BinMap
-    count : int
-    seed : int
-
     Returns
     -------
     GraspList

@@ -47,10 +47,6 @@ def cycle_parts(record: BinMap) -> tuple[tuple[str, ...], FloatArray]:
 def failing_stage(cycle: Cycle) -> IntArray:
     """Stage at which each cycle ends early, -1 where it is whole.
 
-    Parameters
-    ----------
-    cycle : Cycle
-
     Returns
     -------
     int array, shape (nl, ny, nx, no)

@@ -25,11 +25,6 @@ LENGTH_TOLERANCE_RAD = 1e-6
 def check_structure(tree: Tree, layout: Layout) -> list[str]:
     """Compare names, types, dimensions, units and attributes with the layout.
 
-    Parameters
-    ----------
-    tree : Tree
-    layout : Layout
-
     Returns
     -------
     list of str

@@ -145,12 +145,6 @@ def join(parts: Sequence[Facets]) -> Facets:
 def render(facets: Facets, window: Window, pixels_per_m: float) -> FloatArray:
     """Draw facets.
 
-    Parameters
-    ----------
-    facets : Facets
-    window : Window
-    pixels_per_m : float
-
     Returns
     -------
     array, shape (rows, columns, 4)

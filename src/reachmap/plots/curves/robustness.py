@@ -19,12 +19,7 @@ from reachmap.plots.parts.style import (
 
 @drawing()
 def draw_robustness(record: Robustness) -> Figure:
-    """Test grasps that stay reachable over multiples of the errors.
-
-    Parameters
-    ----------
-    record : Robustness
-    """
+    """Test grasps that stay reachable over multiples of the errors."""
     summary = summarise_robustness(record)
     figure = new_figure(6.8, 4.6)
     axes = axes_at(figure, 0.85, 0.62, 5.6, 3.15)

@@ -34,11 +34,6 @@ def differing_sections(bin_map: BinMap, loaded: LoadedCell) -> list[str]:
     bin changes them; so are the settings of scans and planner. Files are compared by
     their contents, never by their paths.
 
-    Parameters
-    ----------
-    bin_map : BinMap
-    loaded : LoadedCell
-
     Returns
     -------
     list of str

@@ -189,10 +189,6 @@ def cost_groups(
 ) -> dict[str, tuple[FloatArray, FloatArray]]:
     """Terms of J of each quadrant, or of each list that names none.
 
-    Parameters
-    ----------
-    ranked : sequence of RankedList
-
     Returns
     -------
     dict

@@ -132,11 +132,6 @@ class GraspTable:
 def table_from_bin_map(bin_map: BinMap, basis: CostBasis | None = None) -> GraspTable:
     """Arrange a bin map for ranking.
 
-    Parameters
-    ----------
-    bin_map : BinMap
-    basis : CostBasis, optional
-
     Raises
     ------
     MapFileError
