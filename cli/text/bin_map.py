@@ -153,7 +153,7 @@ def reliability_lines(reliability: Mapping[str, Reliability]) -> list[str]:
         else:
             noise = "; mostly chance, not the grasp" if found.is_noise else ""
             said = f"{found.share:.2f} over {plural(found.repeated, 'grasp')}{noise}"
-        rows.append((MEASURES[name].words, said))
+        rows.append((MEASURES[name].label, said))
     return fact_lines(rows)
 
 
@@ -177,7 +177,7 @@ def _measure_lines(measures: Mapping[str, Spread]) -> list[str]:
         shown = MEASURES[name]
         spread = shown.of(measure)
         values = (spread.mean, spread.std, spread.low, spread.median, spread.high)
-        rows.append([shown.words, shown.unit, *(_number(value) for value in values)])
+        rows.append([shown.label, shown.unit, *(_number(value) for value in values)])
     return table_lines(rows, "<<>>>>>")
 
 

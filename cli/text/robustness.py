@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from reachmap.cli.text.evidence import PAIRS_SHOWN
 from reachmap.cli.text.tables import table_lines
-from reachmap.maps.robustness.summary import RobustnessSummary, error_words
+from reachmap.maps.robustness.summary import RobustnessSummary, errors_text
 from reachmap.text import percent_text, plural
 
 
@@ -24,7 +24,7 @@ def robustness_lines(summary: RobustnessSummary) -> list[str]:
     left = 1e3 * summary.margin_m
     kept = f"{left:g} mm of clearance required" if left else "no contact allowed"
     lines = [
-        f"{error_words(summary.errors)} off: {percent_text(given.reachability)} % of "
+        f"{errors_text(summary.errors)} off: {percent_text(given.reachability)} % of "
         f"{plural(summary.grasps, 'test grasp')} stay reachable on average, "
         f"{percent_text(given.certified)} % for certain "
         f"(without errors {percent_text(summary.steps[0].reachability)} %)",

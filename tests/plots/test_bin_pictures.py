@@ -26,7 +26,7 @@ from reachmap.plots.causes import draw_causes
 from reachmap.plots.curves.saturation import draw_saturation
 from reachmap.plots.parts.bin_view import percent_after
 from reachmap.plots.parts.squares import percent_text
-from reachmap.plots.placement import draw_placement, placement_words
+from reachmap.plots.placement import draw_placement, placement_titles
 from reachmap.sampling.orientations import approach_directions, orientation_set
 from tests.support.optional import present
 from tests.support.ranking_maps import make_bin_map
@@ -239,9 +239,9 @@ def test_causes_of_a_workspace_map_cover_all_cubes() -> None:
     draw_causes(synthetic_workspace_map(np.ones((1, 2, 2))))
 
 
-def test_placement_words_tell_pose_and_scores() -> None:
+def test_titles_of_a_placement_tell_pose_and_scores() -> None:
     """Title and subtitle carry the numbers of the chosen candidate."""
-    title, subtitle = placement_words(synthetic_placement())
+    title, subtitle = placement_titles(synthetic_placement())
     assert title == "Bin at x = +0.500, y = +0.100, z = −0.050 m, yaw 86°"
     assert subtitle == (
         "score 96.5 % · worst point 70 % · runner-up 91.0 % · the paper's rule 88.2 %"

@@ -169,11 +169,11 @@ GRASP_MISTAKES: dict[str, tuple[Any, str]] = {
     "null": ({**DOWN, "position": [0, None, 0]}, r"position\[1\]: .*\(got null\)"),
     "far": ({**DOWN, "position": [412, 0, 0]}, "for millimetres give"),
     "big integer": ({**DOWN, "position": [10**400, 0, 0]}, r"position\[0\]: expected"),
-    "zero": ({**DOWN, "direction": [0, 0, 0]}, "a direction needs a length"),
-    "long": ({**DOWN, "direction": [1.7e308, 1.7e308, 0]}, "needs a length"),
+    "zero": ({**DOWN, "direction": [0, 0, 0]}, "a direction needs a finite length"),
+    "long": ({**DOWN, "direction": [1.7e308, 1.7e308, 0]}, "needs a finite length"),
     "quaternion": (
         {"position": [0, 0, 0], "quaternion_wxyz": [1, 1, 0, 0]},
-        r"a rotation has length 1 ± 0.01 \(got 1.414\)",
+        r"a unit quaternion has length 1 ± 0.01 \(got 1.414\)",
     ),
     "mirror": (
         {"position": [0, 0, 0], "rotation_matrix": [[1, 0, 0], [0, 1, 0], [0, 0, -1]]},
@@ -192,7 +192,7 @@ GRASP_MISTAKES: dict[str, tuple[Any, str]] = {
     "overflow": (
         {"position": [0, 0, 0],
          "rotation_matrix": [[1e300, 0, 0], [0, 1e300, 0], [0, 0, 1]]},
-        "not a rotation: it holds",
+        "not a rotation: an element is",
     ),
     "rows": (
         {"position": [0, 0, 0], "rotation_matrix": [[1, 0, 0], [0, 1, 0]]},

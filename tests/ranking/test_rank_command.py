@@ -194,7 +194,7 @@ def test_outputs_are_not_overwritten(folder):
         (["pile-1.json", "--weights", "0", "0", "0"], "one weight at least"),
         (["pile-1.json", "--frame", "camera"], "states its own frame"),
         (["pile-1.json", "--explain", "XX-9"], "no grasp has the id 'XX-9'"),
-        (["pile-1.json", "pile-2.json", "--explain", "NW-00"], "2 grasps answer to"),
+        (["pile-1.json", "pile-2.json", "--explain", "NW-00"], "2 grasps match"),
         (["pile-1.json", "--chart", "chart.pdf"], "expected a name in .png or .svg"),
         (["pile-1.json", "-o", "no/such/folder/r.json"], "does not exist"),
     ],

@@ -482,7 +482,7 @@ def test_payloads_that_do_not_fit_a_line_are_refused(path, monkeypatch):
     """A line is bounded, so that reading it is."""
     monkeypatch.setattr(store_module, "MAX_LINE", 500)
     with (
-        pytest.raises(ValueError, match="no line can hold"),
+        pytest.raises(ValueError, match="too large for a line"),
         open_store(path, header()) as journal,
     ):
         put(journal, 0, '"' + "x" * 1000 + '"')

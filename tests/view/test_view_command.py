@@ -162,7 +162,7 @@ def test_a_click_moves_the_arm_and_reddens_bodies(app: Any) -> None:
     assert app.answer.blocking
     assert app.stage._red == set(app.answer.blocking)
     assert not np.allclose(app.stage._last, before)
-    assert "touches" in app.words.content
+    assert "touches" in app.caption.content
     app.go_home()
     assert not app.stage._red
     assert app.stage._last == pytest.approx(before)

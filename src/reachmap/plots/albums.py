@@ -43,7 +43,7 @@ from reachmap.plots.parts.files import Picture, Table, level_table
 from reachmap.plots.parts.levels import QUANTITY_NAMES, Quantity, level_names
 from reachmap.plots.parts.stack import LevelStack, level_title, stack_of
 from reachmap.plots.parts.style import PercentMap
-from reachmap.plots.placement import draw_placement, placement_words
+from reachmap.plots.placement import draw_placement, placement_titles
 from reachmap.plots.study import draw_best_maps, draw_grid, draw_main_effects
 from reachmap.plots.study_space import draw_interactions, draw_parallel, draw_pareto
 
@@ -219,7 +219,7 @@ def placement_album(
     """List the picture of a placement, on the map it was chosen from if given."""
     picture = _picture(
         "placement",
-        placement_words(placement)[0],
+        placement_titles(placement)[0],
         draw_placement,
         placement,
         workspace,

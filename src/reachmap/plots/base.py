@@ -16,7 +16,7 @@ from matplotlib.lines import Line2D
 from reachmap._typing import FloatArray
 from reachmap.geometry import inverse_transform
 from reachmap.maps.base.record import BasePlacement
-from reachmap.maps.summary.base import base_words
+from reachmap.maps.summary.base import base_sentences
 from reachmap.plots.parts.context import context_of
 from reachmap.plots.parts.outlines import (
     Outline,
@@ -92,7 +92,7 @@ def _draw_places(placement: BasePlacement, percent_map: PercentMap) -> Figure:
     if marks is not None:
         bar = (LEFT + width + 0.2, BOTTOM, 0.14, height)
         colour_bar(figure, marks, bar, "bound of path reachability [%]")
-    _put_words(figure, placement, handles)
+    _write_text(figure, placement, handles)
     return figure
 
 
@@ -212,14 +212,14 @@ def _draw_rail(placement: BasePlacement) -> Figure:
     axes.set_ylim(0.0, 104.0)
     axes.grid(axis="y", color="#e4e4e4", linewidth=0.7)
     handles, _ = axes.get_legend_handles_labels()
-    _put_words(figure, placement, handles)
+    _write_text(figure, placement, handles)
     return figure
 
 
-def _put_words(
+def _write_text(
     figure: Figure, placement: BasePlacement, handles: Sequence[Artist]
 ) -> None:
-    words = base_words(placement)
+    words = base_sentences(placement)
     put_title(figure, LEFT, "Where the robot goes", words[0])
     for number, text in enumerate(words[1:]):
         line = put_text(figure, LEFT, BOTTOM - 0.68 - number * LINE, text)

@@ -120,13 +120,13 @@ def draw_placement(
     bar = (left + width + 0.15, bottom, 0.16, height)
     colour_bar(figure, marks, bar, "Path reachability, score [%]")
     _put_legend(figure, [*handles, *legend_lines(stack.shown(level))], bottom - 0.55)
-    _put_words(figure, placement, left, bottom - (0.75 if count == 2 else 1.70))
-    title, subtitle = placement_words(placement)
+    _write_text(figure, placement, left, bottom - (0.75 if count == 2 else 1.70))
+    title, subtitle = placement_titles(placement)
     put_title(figure, LEFT, title, f"{subtitle} · {context.name}".rstrip(" ·"))
     return figure
 
 
-def placement_words(placement: BinPlacement) -> tuple[str, str]:
+def placement_titles(placement: BinPlacement) -> tuple[str, str]:
     """Title and subtitle: where the bin goes, and its score."""
     x, y, z = placement.T_level_bin()[:3, 3]
     yaw = np.degrees(placement.candidate_pose[placement.chosen, 3])
@@ -355,7 +355,7 @@ def _put_legend(figure: Figure, handles: list[Line2D], top: float) -> None:
     )
 
 
-def _put_words(
+def _write_text(
     figure: Figure, placement: BinPlacement, left: float, top: float
 ) -> None:
     """Write the margins, and why places are excluded, from (left, top)."""

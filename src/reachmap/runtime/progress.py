@@ -85,7 +85,7 @@ class Progress:
         self._samples = deque([(self._started_s, done)])
         if self._on_terminal and not self._quiet:
             self._bar = _new_bar(self._stream)
-            self._bar.add_task(self._label, total=total, said=self._said())
+            self._bar.add_task(self._label, total=total, status=self._status())
             self._write(self._bar.start)
         self._show()
 
@@ -114,9 +114,9 @@ class Progress:
 
     def text(self) -> str:
         """One line of report."""
-        return f"{self._label} {self._said()}"
+        return f"{self._label} {self._status()}"
 
-    def _said(self) -> str:
+    def _status(self) -> str:
         share = self._done / self._total if self._total else 1.0
         parts = [f"{self._done}/{self._total} ({math.floor(100 * share)}%)"]
         if self._done:
@@ -164,7 +164,7 @@ class Progress:
         if self._bar is not None:
             (task,) = self._bar.task_ids
             self._bar.update(
-                task, total=self._total, completed=self._done, said=self._said()
+                task, total=self._total, completed=self._done, status=self._status()
             )
             self._write(self._bar.refresh)
         elif not self._quiet:
@@ -204,7 +204,7 @@ def _new_bar(stream: TextIO) -> rich.progress.Progress:
     return Progress(
         TextColumn("{task.description}"),
         BarColumn(bar_width=24),
-        TextColumn("{task.fields[said]}"),
+        TextColumn("{task.fields[status]}"),
         console=Console(file=stream, force_terminal=True, highlight=False),
         auto_refresh=False,
         redirect_stdout=False,

@@ -80,7 +80,9 @@ class Store(Entries):
         )
         line = seal(body.encode("ascii"), self._seed)
         if len(line) > MAX_LINE:
-            raise ValueError(f"unit {reply.index}: no line can hold its result")
+            raise ValueError(
+                f"unit {reply.index}: its result is too large for a line of the journal"
+            )
         try:
             _write_all(self._descriptor, line + b"\n", self.end)
         except OSError as error:

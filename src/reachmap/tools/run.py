@@ -125,11 +125,11 @@ def run_pipeline(
         ),
         lambda options: bin_scan(placement, bin_map, run=options),
     )
-    page = _told(folder, grasps)
+    page = _present(folder, grasps)
     return PipelineAnswer(made=tuple(chain.made), kept=tuple(chain.kept), report=page)
 
 
-def _told(folder: Path, grasps: Sequence[str | Path]) -> Path:
+def _present(folder: Path, grasps: Sequence[str | Path]) -> Path:
     """Draw the maps of a folder, rank grasps with them, and report; the page."""
     # Always: an earlier run may have been killed among the pictures.
     for name in MAPS:

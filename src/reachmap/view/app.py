@@ -96,7 +96,7 @@ class App:
             self.frame: Any = gui.add_slider(
                 "orientation", min=0, max=1, step=1, initial_value=0, disabled=True
             )
-            self.words: Any = gui.add_html(_paragraph(HINT))
+            self.caption: Any = gui.add_html(_paragraph(HINT))
             self.play: Any = gui.add_button(
                 "Play the path", disabled=not isinstance(self.record, BinMap)
             )
@@ -159,7 +159,7 @@ class App:
         if not self._rows:
             share = self.points.main[point]
             said = "excluded" if np.isnan(share) else f"score {share:.1f} %"
-            self.words.content = _paragraph(said, _place(self.points.position[point]))
+            self.caption.content = _paragraph(said, _place(self.points.position[point]))
             return
         self.frame.max = max(len(self._rows) - 1, 1)
         self.frame.disabled = len(self._rows) < 2
@@ -196,8 +196,8 @@ class App:
             self.stage.redden(shown.blocking if shown.configuration is not None else ())
             self.path = shown.path if shown.path >= 0 else self.path
             where = _place(shown.T_base_tcp[:3, 3])
-            self.words.content = _paragraph(
-                shown.words, f"{where}, orientation {number + 1} of {len(self._rows)}"
+            self.caption.content = _paragraph(
+                shown.text, f"{where}, orientation {number + 1} of {len(self._rows)}"
             )
 
     def go_home(self) -> None:
@@ -209,7 +209,7 @@ class App:
             self.stage.redden()
             self.stage.put_axes(None)
             self.stage.take(self.cell.scan_configuration)
-            self.words.content = _paragraph(HINT)
+            self.caption.content = _paragraph(HINT)
 
     def play_path(self, speed: float = 1.0) -> None:
         """Play the path to the test grasp shown, or one worth watching."""
@@ -224,7 +224,7 @@ class App:
             said = (
                 "the whole cycle" if playback.has_cycle else "to the grasp and back out"
             )
-            self.words.content = _paragraph(
+            self.caption.content = _paragraph(
                 f"Path of {playback.time_s[-1]:.2f} s", said
             )
             began = time.monotonic()

@@ -48,7 +48,7 @@ class Answer:
     path: int = -1
 
     @property
-    def words(self) -> str:
+    def text(self) -> str:
         """The state, and the bodies in the way."""
         said = STATUS_NAMES[self.status]
         if not self.blocking:

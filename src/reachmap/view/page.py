@@ -15,7 +15,7 @@ from reachmap.maps.format.registry import Artefact
 from reachmap.maps.records import BinMap, BinPlacement, WorkspaceMap
 from reachmap.maps.summary.statistics import best_level, level_means, saturation_of
 from reachmap.plots.parts.style import colour_map
-from reachmap.plots.placement import placement_words
+from reachmap.plots.placement import placement_titles
 from reachmap.view.engine import start_server, stop_server
 from reachmap.view.playback import Playback, choose_paths, playback_of
 from reachmap.view.points import MapPoints, points_of
@@ -36,7 +36,7 @@ def headline(record: Artefact | None) -> str:
     if isinstance(record, BinMap):
         found = saturation_of(record)
         return f"Bin map: {found.share[-1]:.1f} % of {found.total} test grasps reached"
-    return placement_words(record)[0]
+    return placement_titles(record)[0]
 
 
 def has_bin(record: Artefact | None) -> bool:
@@ -124,7 +124,7 @@ def _bin_page(
             tcp[: playback.release + 1], name=f"/way_{number}", visible=False
         )
         label = stage.put_label(
-            f"Path {number + 1} of {len(played)}: {_path_words(playback)}",
+            f"Path {number + 1} of {len(played)}: {_path_caption(playback)}",
             name=f"/label_{number}",
             visible=False,
         )
@@ -137,7 +137,7 @@ def _bin_page(
     return str(recording.as_html())
 
 
-def _path_words(playback: Playback) -> str:
+def _path_caption(playback: Playback) -> str:
     layer, y, x, orientation = playback.test_grasp
     after = "whole cycle" if playback.has_cycle else "and back out"
     return (

@@ -75,7 +75,7 @@ class RobustnessSummary:
         return next(step for step in self.steps if step.scale == 1.0)
 
 
-def error_words(errors: Mapping[str, tuple[float, float]]) -> str:
+def errors_text(errors: Mapping[str, tuple[float, float]]) -> str:
     """Sizes of errors in words, as in "bin 5 mm and 1 deg, tool 2 mm"."""
     words = []
     for name, (shift_mm, turn_deg) in errors.items():

@@ -158,7 +158,7 @@ def margin_text(margin: dict[str, float]) -> str:
     )
 
 
-def base_words(placement: BasePlacement) -> list[str]:
+def base_sentences(placement: BasePlacement) -> list[str]:
     """Result of the search, line by line; the headline first."""
     summary = summarise_base(placement)
     lines = [

@@ -26,17 +26,17 @@ from reachmap.maps.summary.statistics import (
 
 
 @dataclass(frozen=True, slots=True)
-class Shown:
+class MeasureDisplay:
     """Display name, unit and factor of a measured variable.
 
     Attributes
     ----------
-    words, unit : str
+    label, unit : str
     scale : float
         Units in one SI unit, in which variables are stored.
     """
 
-    words: str
+    label: str
     unit: str
     scale: float = 1.0
 
@@ -52,20 +52,20 @@ class Shown:
         )
 
 
-MEASURES: dict[str, Shown] = {
-    "path_length": Shown("path length", "rad"),
-    "path_length_planned": Shown("planned part of it", "rad"),
-    "tcp_path_length": Shown("TCP path length", "m"),
-    "planning_cpu_time": Shown("planning time (CPU)", "ms", 1e3),
-    "planning_time": Shown("planning time (wall)", "ms", 1e3),
-    "simplification_time": Shown("simplification time", "ms", 1e3),
-    "execution_time": Shown("execution time", "s"),
-    "effort_checks": Shown("state checks", "1"),
-    "approach_time": Shown("straight approach in it", "s"),
-    "retreat_time": Shown("straight retreat after it", "s"),
-    "clearance": Shown("clearance", "mm", 1e3),
-    "joint_margin": Shown("distance to joint limits", "deg", 180.0 / np.pi),
-    "smallest_singular_value": Shown("smallest singular value", "1"),
+MEASURES: dict[str, MeasureDisplay] = {
+    "path_length": MeasureDisplay("path length", "rad"),
+    "path_length_planned": MeasureDisplay("planned part of it", "rad"),
+    "tcp_path_length": MeasureDisplay("TCP path length", "m"),
+    "planning_cpu_time": MeasureDisplay("planning time (CPU)", "ms", 1e3),
+    "planning_time": MeasureDisplay("planning time (wall)", "ms", 1e3),
+    "simplification_time": MeasureDisplay("simplification time", "ms", 1e3),
+    "execution_time": MeasureDisplay("execution time", "s"),
+    "effort_checks": MeasureDisplay("state checks", "1"),
+    "approach_time": MeasureDisplay("straight approach in it", "s"),
+    "retreat_time": MeasureDisplay("straight retreat after it", "s"),
+    "clearance": MeasureDisplay("clearance", "mm", 1e3),
+    "joint_margin": MeasureDisplay("distance to joint limits", "deg", 180.0 / np.pi),
+    "smallest_singular_value": MeasureDisplay("smallest singular value", "1"),
 }
 """Measured variables, as tables show them; not every map has all of them."""
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from matplotlib.figure import Figure
 
 from reachmap.maps.robustness.record import Robustness
-from reachmap.maps.robustness.summary import error_words, summarise_robustness
+from reachmap.maps.robustness.summary import errors_text, summarise_robustness
 from reachmap.plots.parts.style import (
     BIN_COLOUR,
     INK,
@@ -53,7 +53,7 @@ def draw_robustness(record: Robustness) -> Figure:
     axes.axvline(1.0, color=MUTED, linewidth=1.0)
     axes.set_xlim(0.0, scale[-1])
     axes.set_ylim(0.0, 104.0)
-    axes.set_xlabel(f"size of the errors; 1 is {error_words(summary.errors)}")
+    axes.set_xlabel(f"size of the errors; 1 is {errors_text(summary.errors)}")
     axes.set_ylabel("test grasps [%]")
     axes.grid(axis="y", color="#e4e4e4", linewidth=0.7)
     axes.set_axisbelow(True)
@@ -66,7 +66,7 @@ def draw_robustness(record: Robustness) -> Figure:
         0.85,
         f"{given.reachability:.1f} % of the test grasps survive, "
         f"{given.certified:.1f} % for certain",
-        f"{error_words(summary.errors)} off; of {summary.steps[0].reachability:.1f} % "
+        f"{errors_text(summary.errors)} off; of {summary.steps[0].reachability:.1f} % "
         "without errors",
     )
     return figure

@@ -43,7 +43,7 @@ def find_grasp(ranked: Sequence[RankedList], name: str) -> tuple[RankedList, int
         return hits[0]
     if hits:
         where = ", ".join(f"#{row + 1} of {one.grasps.source}" for one, row in hits[:6])
-        raise SettingsError(f"{len(hits)} grasps answer to {name!a}: {where}")
+        raise SettingsError(f"{len(hits)} grasps match {name!a}: {where}")
     known = [printable(own) for one in ranked for own in one.grasps.ids[:6]]
     raise SettingsError(
         f"no grasp has the id {name!a}; there are {', '.join(known[:8])}, …, and #1, "

@@ -232,7 +232,7 @@ def targets_of(sources: Sequence[str | Path], output: Path | None) -> list[Path]
     Raises
     ------
     OutputError, SettingsError
-        The folder cannot be made, or two lists have one name.
+        The folder cannot be made, or two lists have the same name.
     """
     if output is None:
         return []
@@ -240,7 +240,9 @@ def targets_of(sources: Sequence[str | Path], output: Path | None) -> list[Path]
         return [output]
     targets = [output / _ranked_name(source) for source in sources]
     if len(set(targets)) < len(targets):
-        raise SettingsError("two lists have one name; rank them one after the other")
+        raise SettingsError(
+            "two lists have the same name; rank them one after the other"
+        )
     try:
         output.mkdir(parents=True, exist_ok=True)
     except OSError as error:

@@ -141,7 +141,9 @@ def _check_direction(found: Findings, path: JsonPath, value: Any) -> None:
     vector = _vector(found, path, value, 3)
     if vector is not None and not MIN_DIRECTION <= math.hypot(*vector) < math.inf:
         length = math.hypot(*vector)
-        found.mistake(path, f"a direction needs a length (this one is {length:g} long)")
+        found.mistake(
+            path, f"a direction needs a finite length above 0 (got {length:g})"
+        )
 
 
 def _check_quaternion(found: Findings, path: JsonPath, value: Any) -> None:
@@ -152,7 +154,7 @@ def _check_quaternion(found: Findings, path: JsonPath, value: Any) -> None:
     if error > NORM_LIMIT:
         length = math.hypot(*vector)
         found.mistake(
-            path, f"a rotation has length 1 ± {NORM_LIMIT} (got {length:.4g})"
+            path, f"a unit quaternion has length 1 ± {NORM_LIMIT} (got {length:.4g})"
         )
     elif error > NORM_WARNING:
         found.warn(path, f"length {math.hypot(*vector):.5f} instead of 1; normalised")
@@ -168,7 +170,7 @@ def _check_matrix(found: Findings, path: JsonPath, value: Any) -> None:
         return
     R = np.array(clean)
     if np.abs(R).max() > 1.0 + NORM_LIMIT:
-        found.mistake(path, f"not a rotation: it holds {np.abs(R).max():.4g}")
+        found.mistake(path, f"not a rotation: an element is {np.abs(R).max():.4g}")
         return
     determinant = float(np.linalg.det(R))
     skew = float(np.abs(R.T @ R - np.eye(3)).max())

@@ -89,7 +89,7 @@ def cycle_of(table: GraspTable) -> CycleSeconds:
     """
     if table.cycle is None:
         raise SettingsError(
-            "cost cycle: the map has ways to the grasps only and no whole cycles; give "
+            "cost cycle: the map has paths to grasps but no whole cycles; give "
             "the cell part, lift and drop_off and scan the bin again, or rank by cost "
             "paper"
         )

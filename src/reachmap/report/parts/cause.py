@@ -39,7 +39,7 @@ def cause_section(maps: dict[str, WorkspaceMap | BinMap]) -> Section:
         causes = causes_of(record)
         parts += [
             Heading(name),
-            paragraph(_words(causes)),
+            paragraph(_sentences(causes)),
             drawn(draw_causes(record), f"{name}: states and causes.", record),
             group("pair", _states(causes), _pairs(causes)),
         ]
@@ -68,7 +68,7 @@ def _no_solution(maps: dict[str, WorkspaceMap | BinMap]) -> str:
     )
 
 
-def _words(causes: Causes) -> str:
+def _sentences(causes: Causes) -> str:
     if not causes.pairs:
         return "No pair of bodies blocks a pose."
     pair, blocked = causes.pairs[0]

@@ -20,7 +20,7 @@ def cycle_blocks(record: BinMap) -> Blocks:
         return None
     blocks: list[Blocks] = [
         Heading("Whole picks"),
-        paragraph(_words(cycle)),
+        paragraph(_sentences(cycle)),
     ]
     for layer, name in enumerate(level_names(record.layer)):
         where = (
@@ -46,7 +46,7 @@ def cycle_blocks(record: BinMap) -> Blocks:
     return blocks
 
 
-def _words(cycle: CycleSummary) -> str:
+def _sentences(cycle: CycleSummary) -> str:
     text = (
         f"Of {count(cycle.reached, 'reached test grasp')}, {cycle.whole} have a "
         f"whole cycle ({percent(cycle.reachability)} of all test grasps): "

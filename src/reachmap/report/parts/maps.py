@@ -120,7 +120,7 @@ def placement_section(record: BinPlacement, workspace: WorkspaceMap | None) -> S
         ),
         _candidate_table(summary),
         Heading("Margin"),
-        paragraph(_margin_words(summary)),
+        paragraph(_margin_text(summary)),
         drawn(
             draw_placement(record, workspace),
             "The chosen bin, its alternatives, and every place considered.",
@@ -155,7 +155,7 @@ def _candidate_row(name: str, one: CandidateSummary) -> tuple[object, ...]:
     )
 
 
-def _margin_words(summary: PlacementSummary) -> str:
+def _margin_text(summary: PlacementSummary) -> str:
     if not summary.margin:
         return "Not measured."
     words = [
@@ -315,5 +315,5 @@ def _measure_table(summary: BinSummary) -> Table:
         if spread.count:
             values = (spread.mean, spread.std, spread.low, spread.median, spread.high)
             numbers = (number(value, 3) for value in values)
-            rows.append((f"{shown.words} [{shown.unit}]", *numbers))
+            rows.append((f"{shown.label} [{shown.unit}]", *numbers))
     return table(("", "mean", "std", "least", "median", "most"), rows, "<>>>>>")

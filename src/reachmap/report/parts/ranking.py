@@ -56,7 +56,7 @@ def ranking_section(
         if name:
             parts.append(Heading(name))
         cost = cost_of_list(document)
-        said = _seconds_words if cost == "cycle" else _words
+        said = _seconds_text if cost == "cycle" else _sentences
         parts += [paragraph(said(document)), _table(document)]
         groups[cost] += _groups(document, name, names[cost])
     for cost, own in groups.items():
@@ -73,7 +73,7 @@ def ranking_section(
     return section("ranking", "Which grasps come first", parts)
 
 
-def _words(document: Mapping[str, Any]) -> str:
+def _sentences(document: Mapping[str, Any]) -> str:
     weights = ", ".join(number(weight, 2) for weight in weights_of(document))
     return (
         f"{_counted(document)} "
@@ -83,7 +83,7 @@ def _words(document: Mapping[str, Any]) -> str:
     )
 
 
-def _seconds_words(document: Mapping[str, Any]) -> str:
+def _seconds_text(document: Mapping[str, Any]) -> str:
     own = document["reachmap"]
     failure_s = number(known_number(own.get("failure_cost_s")), 1)
     made = own.get("picks_per_hour")

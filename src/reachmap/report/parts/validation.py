@@ -66,7 +66,7 @@ def _list_table(lists: list[dict[str, Any]]) -> Table:
             (
                 str(one.get("list", "")),
                 one.get("grasps", NONE),
-                *(_share_words(_mapping(confusion, name)) for name in SHARES),
+                *(_share_text(_mapping(confusion, name)) for name in SHARES),
                 NONE if rank is None else signed(rank, 2),
             )
         )
@@ -74,7 +74,7 @@ def _list_table(lists: list[dict[str, Any]]) -> Table:
     return table(head, rows, "<>>>>>")
 
 
-def _share_words(share: Mapping[str, Any]) -> str:
+def _share_text(share: Mapping[str, Any]) -> str:
     known = [known_number(share.get(name)) for name in ("share", "low", "high")]
     said = [None if value is None else 100.0 * value for value in known]
     if said[0] is None:

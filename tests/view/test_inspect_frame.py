@@ -40,7 +40,7 @@ def test_a_reached_frame_shows_its_goal(points: MapPoints, scene: Scene) -> None
         T = scene.kinematics.forward(shown.configuration)
         assert pytest.approx(shown.T_base_tcp, abs=1e-6) == T
         assert scene.checker.is_free(shown.configuration)
-        assert shown.words == "path found"
+        assert shown.text == "path found"
 
 
 def test_a_colliding_frame_shows_the_bodies(points: MapPoints, scene: Scene) -> None:
@@ -53,7 +53,7 @@ def test_a_colliding_frame_shows_the_bodies(points: MapPoints, scene: Scene) -> 
         touching = scene.checker.touching_pairs(shown.configuration)
         names = {scene.checker.body_pairs[k] for k in touching}
         assert " | ".join(shown.blocking) in names
-        assert shown.words.endswith(" touches ".join(shown.blocking))
+        assert shown.text.endswith(" touches ".join(shown.blocking))
 
 
 def test_a_frame_out_of_reach_shows_no_arm(points: MapPoints, scene: Scene) -> None:
