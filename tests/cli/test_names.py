@@ -80,10 +80,17 @@ def test_an_input_that_is_no_file(command: str, name: str, here: Path) -> None:
     assert sorted(here.iterdir()) == before
 
 
-@pytest.mark.parametrize("name", [LONG, LOOP, "grasps.json"])
-def test_a_report_of_no_folder(name: str, here: Path) -> None:
+@pytest.mark.parametrize(
+    ("name", "why"),
+    [
+        (LONG, "no such folder"),
+        (LOOP, "no such folder"),
+        ("grasps.json", "is a file; a report is made of the folder that holds it"),
+    ],
+)
+def test_a_report_of_no_folder(name: str, why: str, here: Path) -> None:
     """A report is made from a folder."""
-    assert f"{name}: no such folder" in refuse("report", name)
+    assert f"{name}: {why}" in refuse("report", name)
 
 
 @pytest.mark.parametrize("name", ["bin.h5", LOOP, "/dev/null", *ODD])

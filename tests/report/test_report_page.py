@@ -305,6 +305,9 @@ def test_folders_without_artefacts_are_refused(tmp_path: Path) -> None:
         report(tmp_path, output=tmp_path / "r.html")
     with pytest.raises(MapFileError, match="no such folder"):
         report(tmp_path / "none", output=tmp_path / "r.html")
+    (tmp_path / "bin.h5").touch()
+    with pytest.raises(MapFileError, match="made of the folder that holds it"):
+        report(tmp_path / "bin.h5", output=tmp_path / "r.html")
     assert not (tmp_path / "r.html").exists()
 
 

@@ -207,21 +207,14 @@ class Replay:
 
         return [of(link) @ T for link, T in zip(self.links, self.offsets, strict=True)]
 
-    def distances(self, q: Any, pairs: Any) -> list[float]:
-        """Signed distance of each of some pairs [m]."""
-        T = [transform(M[0]) for M in self.placed(q[None])]
-        found = []
-        for a, b in pairs:
-            result = coal.DistanceResult()
-            request = coal.DistanceRequest(True)
-            coal.distance(self.shapes[a], T[a], self.shapes[b], T[b], request, result)
-            found.append(result.min_distance)
-        return found
-
-    def hits(self, Q: Any, *, part: bool, skip: Any = ()) -> list[str]:
+    def hits(
+        self, Q: Any, *, part: bool, skip: Any = (), step_m: float = np.inf
+    ) -> list[str]:
         """Pairs that collide at the first of configurations (m, dof) where any does.
 
-        Without the part where it is not held. Boxes that do not meet settle most pairs.
+        Without the part where it is not held. Boxes that do not meet settle most pairs;
+        where no body moves further than ``step_m`` from one configuration to the next,
+        a distance settles the next few.
         """
         placed = self.placed(Q)
         boxes = [box(shape, T) for shape, T in zip(self.shapes, placed, strict=True)]
@@ -231,28 +224,45 @@ class Replay:
             if (not part and "part" in (self.names[a], self.names[b])) or name in skip:
                 continue
             (low_a, high_a), (low_b, high_b) = boxes[a], boxes[b]
-            for row in np.flatnonzero(
-                ((low_a <= high_b) & (low_b <= high_a)).all(axis=1)
-            ):
-                result = coal.CollisionResult()
-                if coal.collide(
-                    self.shapes[a], transform(placed[a][row]),
-                    self.shapes[b], transform(placed[b][row]),
-                    coal.CollisionRequest(), result,
-                ):  # fmt: skip
-                    found.setdefault(int(row), []).append(name)
+            near = ((low_a <= high_b) & (low_b <= high_a)).all(axis=1)
+            free_until = 0
+            for row in np.flatnonzero(near).tolist():
+                if row < free_until:
+                    continue
+                distance_m = self.distance(a, b, placed[a][row], placed[b][row])
+                if distance_m <= 0.0:
+                    found.setdefault(row, []).append(name)
                     break
+                # Both bodies may move; a step before the distance is used up is free.
+                free_until = row + max(1, int(np.ceil(distance_m / (2 * step_m))))
         return found[min(found)] if found else []
+
+    def distance(self, a: int, b: int, T_a: Any, T_b: Any) -> float:
+        """Distance of two bodies at world poses [m], 0 or less where they collide."""
+        shapes = self.shapes[a], transform(T_a), self.shapes[b], transform(T_b)
+        collision = coal.CollisionResult()
+        if coal.collide(*shapes, coal.CollisionRequest(), collision):
+            return 0.0
+        return max(self.signed_distance(a, b, T_a, T_b), 1e-12)
+
+    def signed_distance(self, a: int, b: int, T_a: Any, T_b: Any) -> float:
+        """Distance of two bodies at world poses [m], negative where they collide."""
+        result = coal.DistanceResult()
+        coal.distance(
+            self.shapes[a], transform(T_a), self.shapes[b], transform(T_b),
+            coal.DistanceRequest(True), result,
+        )  # fmt: skip
+        return float(result.min_distance)
 
     def pair(self, first: str, second: str) -> tuple[int, int]:
         """Indices of two bodies."""
         return self.names.index(first), self.names.index(second)
 
-    def tcp(self, q: Any) -> Any:
-        """World position of the TCP, (3,)."""
+    def tcp(self, Q: Any) -> Any:
+        """World positions (m, 3) of the TCP at configurations (m, dof)."""
         k = self.names.index("part")
         back = np.linalg.inv(pose_of(self.cell["part"]["pose"]))
-        return (self.placed(q[None])[k][0] @ back)[:3, 3]
+        return (self.placed(Q)[k] @ back)[:, :3, 3]
 
 
 def transform(T: Any) -> Any:
@@ -313,7 +323,9 @@ def faults_of(
         skip = ("part | bin bottom", "part | bin heap") if stage == 1 else ()
         key = path.tobytes()
         if key not in known:
-            known[key] = replay.hits(dense(path, step_m), part=held, skip=skip)
+            known[key] = replay.hits(
+                dense(path, step_m), part=held, skip=skip, step_m=step_m
+            )
         if known[key]:
             faults.append(f"stage {stage}: {known[key]}")
         if stage > 0:
@@ -328,15 +340,18 @@ def faults_of(
 
 def contact_faults(replay: Replay, lift: Any, step_m: float) -> list[str]:
     """What the lift does to the bottom beyond its allowance."""
-    spec, faults = replay.cell["lift"], []
-    pair = replay.pair("part", "bin bottom")
-    start = replay.tcp(lift[0])
-    for q in dense(lift, step_m):
-        way_m = float(np.linalg.norm(replay.tcp(q) - start))
-        distance_m = replay.distances(q, [pair])[0]
-        least = 0.0 if way_m > spec["contact_distance_m"] + 1e-6 else (
-            -spec["contact_allowance_m"] - 1e-5)  # fmt: skip
-        if distance_m < least:
-            faults.append(f"{1e3 * distance_m:.2f} mm from the bottom at {way_m:.4f} m")
-            break
-    return faults
+    spec, Q = replay.cell["lift"], dense(lift, step_m)
+    part, bottom = replay.pair("part", "bin bottom")
+    placed = replay.placed(Q)
+    way_m = np.linalg.norm(replay.tcp(Q) - replay.tcp(Q[:1]), axis=1)
+    allowed_m = np.where(
+        way_m > spec["contact_distance_m"] + 1e-6,
+        0.0,
+        -spec["contact_allowance_m"] - 1e-5,
+    )
+    for row in range(len(Q)):
+        at = (placed[part][row], placed[bottom][row])
+        distance_m = replay.signed_distance(part, bottom, *at)
+        if distance_m < allowed_m[row]:
+            return [f"{1e3 * distance_m:.2f} mm from the bottom at {way_m[row]:.4f} m"]
+    return []

@@ -183,6 +183,10 @@ def read_run_folder(folder: Path) -> RunFolder:
     MapFileError
         It is not a folder, or none of its artefacts can be read.
     """
+    if is_there(folder) and not is_folder(folder):
+        raise MapFileError(
+            f"{folder}: is a file; a report is made of the folder that holds it"
+        )
     if not is_folder(folder):
         raise MapFileError(f"{folder}: no such folder")
     reader = _Reader(folder)
