@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 import logging
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,8 +17,8 @@ from reachmap.cell.model.cell import Cell
 from reachmap.cell.model.shapes import sides
 from reachmap.disk import as_path
 from reachmap.errors import SettingsError
-from reachmap.maps import BinMap, check_outputs, publish, read_bin_map
-from reachmap.maps.bytes.publish import check_picture
+from reachmap.maps import BinMap, check_outputs, read_bin_map
+from reachmap.maps.bytes.publish import check_picture, publish_json
 from reachmap.picking.emptying import Emptied, Fate, Order, empty_heap
 from reachmap.picking.heap import Heap, drop_heap
 from reachmap.picking.summary import HeapSummary, summarise_heap
@@ -196,8 +195,7 @@ def empty(
     answer = EmptyAnswer(part=box, fill=fill, order=order, heaps=found)
     if output is not None:
         facts = {"map": bin_map.stamp.content_sha256} | answer.facts(with_parts=True)
-        text = json.dumps(facts, indent=1, allow_nan=False)
-        publish(output, [text.encode("ascii"), b"\n"], overwrite=overwrite)
+        publish_json(output, facts, overwrite=overwrite)
     if picture is not None:
         _draw(picture, bin_map, answer, overwrite=overwrite)
     return answer

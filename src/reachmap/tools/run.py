@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from reachmap.cell.loading import read_cell
-from reachmap.errors import OutputError, SettingsError
+from reachmap.errors import SettingsError
 from reachmap.maps import read_bin_map, read_placement, read_workspace_map
+from reachmap.maps.bytes.publish import make_folder
 from reachmap.runtime.options import IN_PROCESS, RunOptions
 from reachmap.tools.bin_scan import bin_scan
 from reachmap.tools.heatmap import heatmap
@@ -96,10 +97,7 @@ def run_pipeline(
         )
     for source in grasps:
         read_list(source, ListFormat())
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OutputError(f"{folder}: cannot be made: {error.strerror}") from None
+    make_folder(folder)
     workspace, placement, bin_map = (folder / name for name in MAPS)
     chain = _Chain(run)
     chain.step(

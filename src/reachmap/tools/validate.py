@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 import logging
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -15,7 +14,7 @@ import numpy as np
 from reachmap.disk import as_path
 from reachmap.errors import GraspListError, SettingsError
 from reachmap.maps import read_bin_map
-from reachmap.maps.bytes.publish import check_outputs, check_picture, publish
+from reachmap.maps.bytes.publish import check_outputs, check_picture, publish_json
 from reachmap.maps.provenance import cell_of_artefact
 from reachmap.maps.records import BinMap
 from reachmap.ranking.answers.pipeline import pose_from_numbers, rank_list
@@ -294,8 +293,7 @@ def _calibrate(validation: Validation, path: Path, *, overwrite: bool) -> None:
             **{name: said[name] for name in names},
         },
     )
-    text = json.dumps(found.document(), indent=1, allow_nan=False)
-    publish(path, [text.encode("ascii"), b"\n"], overwrite=overwrite)
+    publish_json(path, found.document(), overwrite=overwrite)
     logger.warning(
         "%s: %d grasps, %d reached; cross-validated calibration error %.3f",
         path,
@@ -358,8 +356,7 @@ def _write(
     overwrite: bool,
 ) -> None:
     if output is not None:
-        text = json.dumps(facts_of(validation, body_pairs), indent=1, allow_nan=False)
-        publish(output, [text.encode("ascii"), b"\n"], overwrite=overwrite)
+        publish_json(output, facts_of(validation, body_pairs), overwrite=overwrite)
     if chart is not None:
         # Imported here: drawing is rarely requested.
         from reachmap.plots.parts.files import write_picture

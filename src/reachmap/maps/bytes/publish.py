@@ -5,11 +5,13 @@ from __future__ import annotations
 import contextlib
 import errno
 import fcntl
+import json
 import os
 import stat
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextvars import ContextVar
 from pathlib import Path
+from typing import Any
 
 from reachmap.disk import is_text, is_there, real_path
 from reachmap.errors import NoRoomError, OutputError, SettingsError
@@ -56,7 +58,7 @@ def check_output(
         problem = _conflict(target, inputs)
         problem = problem or _obstacle(path, target, overwrite=overwrite)
     except OSError as error:
-        problem = f"cannot be written ({_reason(error)})"
+        problem = f"cannot be written ({reason_of(error)})"
     if problem:
         raise OutputError(f"{path}: {problem}")
     return target
@@ -196,8 +198,28 @@ def publish(path: Path, chunks: Iterable[bytes], *, overwrite: bool = False) -> 
         raise OutputError(f"{path}: {EXISTS}") from None
     except OSError as error:
         kind = NoRoomError if error.errno in NO_ROOM else OutputError
-        raise kind(f"{path}: cannot be written ({_reason(error)})") from error
+        raise kind(f"{path}: cannot be written ({reason_of(error)})") from error
     return target
+
+
+def publish_json(path: Path, value: Any, *, overwrite: bool) -> Path:
+    """Write plain values as JSON text; see :func:`publish`."""
+    text = json.dumps(value, indent=1, allow_nan=False)
+    return publish(path, [text.encode("ascii"), b"\n"], overwrite=overwrite)
+
+
+def make_folder(path: Path) -> None:
+    """Make a folder, and those above it, if it is not there.
+
+    Raises
+    ------
+    OutputError
+        It cannot be made.
+    """
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"{path}: cannot be made ({reason_of(error)})") from error
 
 
 @contextlib.contextmanager
@@ -309,5 +331,6 @@ def sync_folder(folder: Path) -> None:
             os.close(descriptor)
 
 
-def _reason(error: OSError) -> str:
+def reason_of(error: OSError) -> str:
+    """Say why the system refused, for a message."""
     return error.strerror or type(error).__name__

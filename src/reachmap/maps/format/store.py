@@ -26,7 +26,7 @@ from reachmap.maps.bytes.isolation import (
     isolated,
     named_size,
 )
-from reachmap.maps.bytes.publish import publish
+from reachmap.maps.bytes.publish import publish, reason_of
 from reachmap.maps.bytes.tree import Leaf, Tree
 from reachmap.maps.format.checks import check_ranges, check_structure
 from reachmap.maps.format.layout import (
@@ -254,8 +254,7 @@ def read_bytes(path: Path, layouts: Sequence[Layout] = ()) -> bytes:
     except FileNotFoundError as error:
         raise MapFileError(f"{path}: no such file; {_expected(layouts)}") from error
     except OSError as error:
-        reason = error.strerror or type(error).__name__
-        raise MapFileError(f"{path}: cannot be read ({reason})") from error
+        raise MapFileError(f"{path}: cannot be read ({reason_of(error)})") from error
     if data is None:
         raise MapFileError(f"{path}: larger than {MAX_BYTES >> 30} GiB")
     return data

@@ -12,8 +12,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from reachmap._typing import FloatArray
-from reachmap.errors import OutputError
-from reachmap.maps.bytes.publish import check_outputs, publish
+from reachmap.maps.bytes.publish import check_outputs, make_folder, publish
 from reachmap.plots.parts.style import Format, figure_bytes
 
 
@@ -69,7 +68,7 @@ def write_all(
         A file exists and ``overwrite`` is off, or the folder cannot be written.
     """
     items = tuple(items)
-    _make_folder(folder)
+    make_folder(folder)
     paths = tuple(
         folder / f"{item.name}.{'csv' if isinstance(item, Table) else kind}"
         for item in items
@@ -104,14 +103,6 @@ def write_picture(
     kind: Format = "svg" if path.suffix == ".svg" else "png"
     data = figure_bytes(figure, kind, title=title, config_sha256=config_sha256)
     return publish(path, [data], overwrite=overwrite)
-
-
-def _make_folder(folder: Path) -> None:
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        reason = error.strerror or type(error).__name__
-        raise OutputError(f"{folder}: cannot be made ({reason})") from error
 
 
 def level_table(x: FloatArray, y: FloatArray, values: FloatArray) -> str:

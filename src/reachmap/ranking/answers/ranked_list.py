@@ -15,8 +15,8 @@ import numpy as np
 
 from reachmap._typing import FloatArray
 from reachmap.disk import is_folder
-from reachmap.errors import OutputError, SettingsError
-from reachmap.maps.bytes.publish import publish
+from reachmap.errors import SettingsError
+from reachmap.maps.bytes.publish import make_folder, publish
 from reachmap.ranking.lists.arrays import GraspList
 from reachmap.ranking.lists.reading import STDIN
 from reachmap.ranking.lookup.costs import LIKENESS
@@ -243,10 +243,7 @@ def targets_of(sources: Sequence[str | Path], output: Path | None) -> list[Path]
         raise SettingsError(
             "two lists have the same name; rank them one after the other"
         )
-    try:
-        output.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OutputError(f"{output}: cannot be made: {error.strerror}") from error
+    make_folder(output)
     return targets
 
 
