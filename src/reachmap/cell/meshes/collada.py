@@ -13,7 +13,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 from reachmap._typing import FloatArray, IntArray
-from reachmap.cell.meshes.polygons import MeshError, fans
+from reachmap.cell.meshes.polygons import MeshError, fan_triangles
 from reachmap.geometry import rotation_from_quaternion_wxyz
 
 Element = ElementTree.Element
@@ -134,7 +134,7 @@ class _Document:
         ]
         counts = element.find("{*}vcount")
         sizes = [] if counts is None else [int(n) for n in (counts.text or "").split()]
-        return points, fans(_POLYGONS[_tag(element)](lists, sizes))
+        return points, fan_triangles(_POLYGONS[_tag(element)](lists, sizes))
 
     def _positions(self, vertices: Element) -> FloatArray:
         place = vertices.find("{*}input[@semantic='POSITION']")

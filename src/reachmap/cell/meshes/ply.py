@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from reachmap._typing import FloatArray, IntArray
-from reachmap.cell.meshes.polygons import MeshError, fans
+from reachmap.cell.meshes.polygons import MeshError, fan_triangles
 
 _TYPES = {
     "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1",
@@ -62,7 +62,7 @@ def ply_triangles(data: bytes) -> tuple[FloatArray, IntArray]:
         wanted = {"vertex_indices", "vertex_index"} & set(names)
         found = rows.lists(element, names.index(wanted.pop()) if wanted else -1)
         if element.name == "face":
-            polygons = fans(found)
+            polygons = fan_triangles(found)
     return vertices, polygons
 
 

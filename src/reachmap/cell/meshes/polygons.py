@@ -13,7 +13,7 @@ class MeshError(ValueError):
     """A mesh file is damaged or of an unknown format."""
 
 
-def fans(polygons: Sequence[Sequence[int]]) -> IntArray:
+def fan_triangles(polygons: Sequence[Sequence[int]]) -> IntArray:
     """Triangles of polygons, each as a fan about its first corner, shape (n, 3).
 
     That is exact for convex polygons; of others the fan reaches into the hollows.

@@ -17,7 +17,7 @@ import numpy as np
 from reachmap._typing import FloatArray, IntArray
 from reachmap.cell.meshes.collada import collada_triangles
 from reachmap.cell.meshes.ply import ply_triangles
-from reachmap.cell.meshes.polygons import MeshError, fans
+from reachmap.cell.meshes.polygons import MeshError, fan_triangles
 from reachmap.cell.model.shapes import TriangleMesh
 
 __all__ = ["MeshError", "read_mesh"]
@@ -153,7 +153,7 @@ def _obj_triangles(data: bytes) -> tuple[FloatArray, IntArray]:
                 raise MeshError("a face names vertex 0; they are counted from 1")
             # Negative numbers count backwards from the last vertex so far.
             polygons.append([k - 1 if k > 0 else len(vertices) + k for k in corners])
-    return _numbers(vertices), fans(polygons)
+    return _numbers(vertices), fan_triangles(polygons)
 
 
 def _numbers(rows: Sequence[Sequence[bytes]]) -> FloatArray:

@@ -14,7 +14,7 @@ from reachmap._typing import FloatArray
 from reachmap.cell.files.urdf import FREE_JOINTS, MOVING
 from reachmap.cell.model.cell import JointLimits, RobotSpec
 from reachmap.core.robot.limits import LimitTable, merge_limits
-from reachmap.core.robot.urdf_joints import LINK_MARK, Follower, UrdfJoints
+from reachmap.core.robot.urdf_joints import LINK_MARK, MimicJoint, UrdfJoints
 from reachmap.errors import SceneError
 
 TCP_FRAME = "reachmap_tcp"
@@ -209,7 +209,7 @@ def with_followers(
     full: Any,
     chain: Any,
     q_locked: FloatArray,
-    followers: Mapping[str, Follower],
+    followers: Mapping[str, MimicJoint],
 ) -> Any:
     """Model of the chain's joints, in order, and then of those that follow them.
 
@@ -252,7 +252,7 @@ def with_followers(
 
 
 def following(
-    moving: Sequence[str], followers: Sequence[tuple[str, Follower]]
+    moving: Sequence[str], followers: Sequence[tuple[str, MimicJoint]]
 ) -> tuple[FloatArray, FloatArray]:
     """Matrix (followers, dof) and offset (followers,) from moving joints to others."""
     matrix = np.zeros((len(followers), len(moving)))

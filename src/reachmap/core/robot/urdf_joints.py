@@ -29,8 +29,8 @@ _FAR_M = 1e6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Follower:
-    """A joint that stands at ``multiplier * position(leader) + offset``."""
+class MimicJoint:
+    """A joint that mimics another: ``multiplier * position(leader) + offset``."""
 
     leader: str
     multiplier: float
@@ -55,7 +55,7 @@ class UrdfJoints:
     text: str
     description: UrdfDescription
     joints: Mapping[str, UrdfJoint]
-    followers: Mapping[str, Follower]
+    followers: Mapping[str, MimicJoint]
 
 
 def read_urdf_joints(urdf: str) -> UrdfJoints:
@@ -80,7 +80,7 @@ def read_urdf_joints(urdf: str) -> UrdfJoints:
     for name, joint in joints.items():
         if joint.mimics is not None:
             try:
-                followers[name] = _follower(name, joints)
+                followers[name] = _mimic_joint(name, joints)
             except ValueError as error:
                 problems.append(f"robot.urdf: joint {name!r}: {error}")
     if problems:
@@ -91,7 +91,7 @@ def read_urdf_joints(urdf: str) -> UrdfJoints:
     )
 
 
-def _follower(name: str, joints: Mapping[str, UrdfJoint]) -> Follower:
+def _mimic_joint(name: str, joints: Mapping[str, UrdfJoint]) -> MimicJoint:
     """Follow a chain of mimicking joints to the one that leads."""
     multiplier, offset, seen = 1.0, 0.0, [name]
     while (joint := joints[seen[-1]]).mimics is not None:
@@ -100,7 +100,7 @@ def _follower(name: str, joints: Mapping[str, UrdfJoint]) -> Follower:
         offset += multiplier * joint.offset
         multiplier *= joint.multiplier
         seen.append(joint.mimics)
-    return Follower(leader=seen[-1], multiplier=multiplier, offset=offset)
+    return MimicJoint(leader=seen[-1], multiplier=multiplier, offset=offset)
 
 
 def _engine_text(urdf: str, description: UrdfDescription) -> str:
