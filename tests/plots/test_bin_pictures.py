@@ -25,7 +25,7 @@ from reachmap.plots.bin_map import (
 from reachmap.plots.causes import draw_causes
 from reachmap.plots.curves.saturation import draw_saturation
 from reachmap.plots.parts.bin_view import percent_after
-from reachmap.plots.parts.squares import percent_text
+from reachmap.plots.parts.squares import whole_percent
 from reachmap.plots.placement import draw_placement, placement_titles
 from reachmap.sampling.orientations import approach_directions, orientation_set
 from tests.support.optional import present
@@ -67,7 +67,7 @@ def test_every_number_is_the_share_of_the_point() -> None:
             for column, x in enumerate(bin_map.x):
                 tries = bin_map.path_found[0, row, column, :, :attempts]
                 share = 100.0 * float(np.mean([any(frame) for frame in tries]))
-                assert shown[float(x), float(y)] == percent_text(share)
+                assert shown[float(x), float(y)] == whole_percent(share)
 
 
 def test_test_grasps_that_were_not_tried_do_not_count() -> None:

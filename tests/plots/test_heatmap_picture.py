@@ -25,8 +25,8 @@ from reachmap.plots.parts.levels import (
 from reachmap.plots.parts.squares import (
     cell_edges,
     number_size,
-    percent_text,
     signed_text,
+    whole_percent,
 )
 from reachmap.plots.parts.stack import level_subtitle, level_title, stack_of
 from tests.support.synthetic_maps import (
@@ -239,11 +239,11 @@ def test_overview_has_a_panel_for_each_level_and_the_means() -> None:
     )
 
 
-def test_percent_text_keeps_0_and_100_for_none_and_all() -> None:
+def test_whole_percent_keeps_0_and_100_for_none_and_all() -> None:
     """99.7 % is not everything and 0.2 % is not nothing."""
     given = [0.0, 0.2, 1.4, 53.53, 99.4, 99.7, 100.0, float("nan")]
     expected = ["0", "1", "1", "54", "99", "99", "100", "–"]
-    assert [percent_text(value) for value in given] == expected
+    assert [whole_percent(value) for value in given] == expected
     assert [signed_text(v) for v in (12.4, -3.6, 0.2)] == ["+12", "−4", "0"]
 
 

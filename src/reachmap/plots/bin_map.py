@@ -22,7 +22,7 @@ from reachmap.plots.parts.squares import (
     colour_bar,
     draw_squares,
     number_size,
-    percent_text,
+    whole_percent,
 )
 from reachmap.plots.parts.style import (
     COST_MAP,
@@ -157,7 +157,7 @@ class _Panel:
 
     def text(self, value: float) -> str:
         if self.percent:
-            return percent_text(value)
+            return whole_percent(value)
         return MISSING if np.isnan(value) else f"{value:.{self.digits}f}"
 
 

@@ -27,8 +27,8 @@ from reachmap.plots.parts.squares import (
     colour_bar,
     draw_squares,
     number_size,
-    percent_text,
     signed_text,
+    whole_percent,
 )
 from reachmap.plots.parts.style import (
     CHANGE_MAP,
@@ -149,7 +149,7 @@ def draw_comparison(
             value,
             colours=colour_map(percent_map),
             scale=PERCENT_SCALE,
-            text=percent_text,
+            text=whole_percent,
             font_size=number_size(maps.x, maps.y, scale_in),
             scale_in=scale_in,
             lines=[closed_path(outline.polygon) for outline in maps.shown(level)],

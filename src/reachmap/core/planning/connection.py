@@ -302,20 +302,15 @@ class _Connector:
                 turns = np.round((q + change - self._Q[goal]) / TURN_RAD)
                 turns = np.where(self._windings.turns, turns, 0).astype(np.int64)
                 q_goal = self._Q[goal] + TURN_RAD * turns
-                if self._allows(int(goal), turns) and self._motions.is_verified(
-                    q, q_goal
-                ):
+                if self._roadmap.allows(
+                    int(goal), turns, self._windings
+                ) and self._motions.is_verified(q, q_goal):
                     break
             else:
                 return False
         part.attempts += 1
         self._arrive(part, int(goal), turns, int(node), np.array([q, q_goal]))
         return True
-
-    def _allows(self, goal_node: int, turns: IntArray) -> bool:
-        goals = self._roadmap.goals
-        low, high = goals.low[goal_node - 1], goals.high[goal_node - 1]
-        return self._windings.allows(low, high, turns)
 
     def _search_samples(self, part: _Component) -> bool:
         """Look for a way out of a component with the lazy roadmap of samples."""

@@ -168,17 +168,12 @@ class Explorer:
             arrives = turns
             if self._turns is not None:
                 total = self._known_turns[turns] + self._turns[k]
-                if not self._within_limits(near, total):
+                if not self._roadmap.allows(near, total, self._windings):
                     continue
                 arrives = self._number(total)
             motions.append((here + self._length[k], near, arrives, node, base))
         motions.sort()
         return motions
-
-    def _within_limits(self, goal_node: int, turns: IntArray) -> bool:
-        goals = self._roadmap.goals
-        low, high = goals.low[goal_node - 1], goals.high[goal_node - 1]
-        return self._windings.allows(low, high, turns)
 
     def _number(self, turns: IntArray) -> int:
         key = turns.tobytes()

@@ -17,7 +17,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import dijkstra
 
 from reachmap._typing import BoolArray, FloatArray, IntArray
-from reachmap.core.kinematics.windings import TURN_RAD
+from reachmap.core.kinematics.windings import TURN_RAD, Windings
 
 START = 0
 
@@ -91,6 +91,11 @@ class Roadmap:
             configurations=[start, *goals.Q],
             frame_reached=np.zeros(int(goals.frame.max(initial=-1)) + 1, bool),
         )
+
+    def allows(self, goal_node: int, turns: IntArray, windings: Windings) -> bool:
+        """Whether a goal and the way on from it stay within the limits when turned."""
+        low, high = self.goals.low[goal_node - 1], self.goals.high[goal_node - 1]
+        return windings.allows(low, high, turns)
 
     @property
     def goal_array(self) -> FloatArray:

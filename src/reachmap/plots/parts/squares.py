@@ -96,12 +96,12 @@ PERCENT_SCALE = Normalize(0.0, 100.0)
 LINE_HEIGHT = 1.2
 
 
-def percent_text(value: float) -> str:
+def whole_percent(value: float) -> str:
     """Whole percent; 0 and 100 are kept for exactly none and exactly all.
 
     Examples
     --------
-    >>> [percent_text(v) for v in (0.0, 0.2, 53.53, 99.7, 100.0)]
+    >>> [whole_percent(v) for v in (0.0, 0.2, 53.53, 99.7, 100.0)]
     ['0', '1', '54', '99', '100']
     """
     if np.isnan(value):
@@ -158,7 +158,7 @@ def draw_squares(
     *,
     colours: Colormap,
     scale: Normalize,
-    text: Callable[[float], str] = percent_text,
+    text: Callable[[float], str] = whole_percent,
     font_size: float = 8.0,
     separator: str = "white",
     halo: bool = True,
