@@ -10,8 +10,8 @@ their own):
 - CPU time of the scan with and without the part, in one run (cells only);
 - stored cycles replayed by code that shares nothing with the planner;
 - precision and recall of ``rank --cost cycle`` against planning without a map
-  (:mod:`reachmap.scans.cycle.fresh`), on random grasps anywhere in the bin, and how
-  the first ten of lists do in supplied order, by J and by seconds;
+  (:mod:`reachmap.scans.cycle.from_scratch`), on random grasps anywhere in the bin, and
+  how the first ten of lists do in supplied order, by J and by seconds;
 - the time of planned segments over the least that is known between the same ends: of
   six plans, each shortened three times as long as the scan does.
 

@@ -19,7 +19,7 @@ from reachmap.maps import Status, read_bin_map
 from reachmap.maps.cycle.summary import summarise_cycle
 from reachmap.maps.parts import StageStatus
 from reachmap.runtime.options import RunOptions
-from reachmap.scans.cycle.fresh import FreshCycles
+from reachmap.scans.cycle.from_scratch import FreshCycles
 from reachmap.scans.cycle.scenes import STAGES, CycleScenes
 from reachmap.tools.bin_scan import bin_scan, summary_of_bin
 from reachmap.tools.check import check

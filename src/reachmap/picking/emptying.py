@@ -1,4 +1,4 @@
-"""Simulated emptying: which parts are picked, in what order, and which remain."""
+"""Simulated emptying: which parts are picked, which remain, in what order and where."""
 
 from __future__ import annotations
 
@@ -8,10 +8,16 @@ from typing import Literal
 
 import numpy as np
 
-from reachmap._typing import CodeArray, FloatArray, IntArray
+from reachmap._typing import BoolArray, CodeArray, FloatArray, IntArray
+from reachmap.maps.records import BinMap
+from reachmap.maps.summary.emptying import wall_name
 from reachmap.picking.heap import Heap
 
 Order = Literal["highest", "rank"]
+
+# What stays is said to be in one place if this much of it is; a part within this
+# share of the half side of a wall lies along it.
+MOST, ALONG = 0.6, 0.6
 
 
 class Fate(IntEnum):
@@ -72,3 +78,82 @@ def empty_heap(heap: Heap, cost: FloatArray, order: Order = "highest") -> Emptie
     # What lies free and was not picked is what the arm does not reach.
     fate[(turn < 0) & (waiting == 0)] = Fate.UNREACHABLE
     return Emptied(fate=fate, turn=turn)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HeapSummary:
+    """One heap after the last pick.
+
+    Attributes
+    ----------
+    seed : int
+    parts, picked : int
+    unreachable, covered : int
+        Parts that stay: not reached, and below those.
+    outside_map : int
+        Of the unreachable, those that the map says nothing about.
+    left_percent : float
+        Parts that stay.
+    where : str
+        Where most of them lie, as in "along the far wall"; "" where none stay.
+    highest_left_m : float or None
+        Height of the highest part that stays.
+    """
+
+    seed: int
+    parts: int
+    picked: int
+    unreachable: int
+    covered: int
+    outside_map: int
+    left_percent: float
+    where: str
+    highest_left_m: float | None
+
+
+def summarise_heap(
+    bin_map: BinMap, heap: Heap, emptied: Emptied, outside: BoolArray, seed: int
+) -> HeapSummary:
+    """Count picked and remaining parts.
+
+    Parameters
+    ----------
+    bin_map : BinMap
+    heap : Heap
+    emptied : Emptied
+    outside : bool array, shape (n,)
+        Parts that the map says nothing about.
+    seed : int
+        Of the heap.
+    """
+    stays = emptied.fate != Fate.PICKED
+    heights = heap.position[stays, 2]
+    return HeapSummary(
+        seed=seed,
+        parts=len(heap),
+        picked=int((~stays).sum()),
+        unreachable=int((emptied.fate == Fate.UNREACHABLE).sum()),
+        covered=int((emptied.fate == Fate.COVERED).sum()),
+        outside_map=int((outside & (emptied.fate == Fate.UNREACHABLE)).sum()),
+        left_percent=100.0 * int(stays.sum()) / max(len(heap), 1),
+        where=place_of(bin_map, heap, stays),
+        highest_left_m=float(heights.max()) if len(heights) else None,
+    )
+
+
+def place_of(bin_map: BinMap, heap: Heap, stays: BoolArray) -> str:
+    """Where parts lie, seen from the robot, "" where there are none."""
+    if not stays.any():
+        return ""
+    share = heap.position[stays, :2] / (bin_map.bin_inner[:2] / 2.0)
+    axis = np.argmax(np.abs(share), axis=1)
+    value = share[np.arange(len(share)), axis]
+    beside = np.abs(value) >= ALONG
+    count = len(share)
+    for k in range(2):
+        for sign in (1, -1):
+            if (beside & (axis == k) & (np.sign(value) == sign)).sum() >= MOST * count:
+                return f"along the {wall_name(bin_map, k, sign)} wall"
+    if beside.sum() >= MOST * count:
+        return "around the walls"
+    return "in the middle" if beside.sum() <= (1 - MOST) * count else "all over the bin"

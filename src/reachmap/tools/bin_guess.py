@@ -22,7 +22,7 @@ from reachmap.geometry import (
 from reachmap.maps.records import NO_PAIR, Status
 from reachmap.maps.summary.statistics import most_likely_cause
 from reachmap.sampling.frames import FrameGrid, approach_distance_m, bin_test_frames
-from reachmap.tools.trial import reach_of
+from reachmap.tools.arm_sampling import reach_of
 
 # A place is taken where this share of a few test grasps can be reached: the walls deny
 # others to any tool.

@@ -19,9 +19,15 @@ from reachmap.disk import as_path
 from reachmap.errors import SettingsError
 from reachmap.maps import BinMap, check_outputs, read_bin_map
 from reachmap.maps.bytes.publish import check_picture, publish_json
-from reachmap.picking.emptying import Emptied, Fate, Order, empty_heap
+from reachmap.picking.emptying import (
+    Emptied,
+    Fate,
+    HeapSummary,
+    Order,
+    empty_heap,
+    summarise_heap,
+)
 from reachmap.picking.heap import Heap, drop_heap
-from reachmap.picking.summary import HeapSummary, summarise_heap
 from reachmap.ranking.lookup.calibration import usual_calibration
 from reachmap.ranking.lookup.order import OUTSIDE_MAP, UNLIKE_MAP
 from reachmap.ranking.lookup.ranker import Ranker

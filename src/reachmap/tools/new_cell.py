@@ -33,7 +33,7 @@ from reachmap.disk import as_path
 from reachmap.errors import CellError, ReachmapError, SceneError, SettingsError
 from reachmap.geometry import quaternion_wxyz_from_rotation
 from reachmap.maps.bytes.publish import check_output, publish
-from reachmap.tools import trial
+from reachmap.tools import arm_sampling
 from reachmap.tools.bin_guess import ENOUGH, BinGuess, guess_bin, guess_notes
 from reachmap.tools.robot_source import RobotSource, read_source
 
@@ -233,7 +233,7 @@ class _Attempt:
         self.notes += [line for line in warnings if line not in self._source.notes]
         try:
             arm = RobotModel.from_cell(loaded)
-            Q = trial.as_written(arm, trial.random_configurations(arm))
+            Q = arm_sampling.as_written(arm, arm_sampling.random_configurations(arm))
             self._measure(arm, Q)
             scene = self._without_touching(Scene.build(self._loaded()), Q[:300])
             scene = self._with_bin(scene, Q)
@@ -257,8 +257,8 @@ class _Attempt:
 
     def _measure(self, arm: RobotModel, Q: FloatArray) -> None:
         kinematics = Kinematics(arm)
-        reach = trial.reach_of(kinematics.forward_many(Q)[:, :3, 3])
-        axis = trial.approach_axis(kinematics, Q[0], reach)
+        reach = arm_sampling.reach_of(kinematics.forward_many(Q)[:, :3, 3])
+        axis = arm_sampling.approach_axis(kinematics, Q[0], reach)
         axis = axis or self.choices.approach_axis
         self.choices = replace(
             self.choices,
@@ -270,9 +270,11 @@ class _Attempt:
 
     def _without_touching(self, scene: Scene, Q: FloatArray) -> Scene:
         """Disable pairs of links that touch in every position, in an SRDF."""
-        touching = trial.touching_links(scene, Q)
-        pairs = [pair for pair, share in touching.items() if share >= trial.ALWAYS]
-        self.notes += trial.touching_notes(touching)
+        touching = arm_sampling.touching_links(scene, Q)
+        pairs = [
+            pair for pair, share in touching.items() if share >= arm_sampling.ALWAYS
+        ]
+        self.notes += arm_sampling.touching_notes(touching)
         if not pairs:
             return scene
         if self.choices.srdf:
@@ -317,7 +319,7 @@ class _Attempt:
         states = self._states()
         if states:
             rows = [[v[j.name] for j in joints] for v in states.values()]
-            seen = trial.best_view(scene, np.array(rows), axis, reach)
+            seen = arm_sampling.best_view(scene, np.array(rows), axis, reach)
             if seen is not None and seen[1] >= LOOKS_DOWN:
                 names = list(states)
                 best = names.pop(seen[0])
@@ -329,8 +331,8 @@ class _Attempt:
             )
         found = None
         if self.choices.tool_m:
-            found = trial.best_view(self._with_tool(), Q, axis, reach)
-        found = found or trial.best_view(scene, Q, axis, reach)
+            found = arm_sampling.best_view(self._with_tool(), Q, axis, reach)
+        found = found or arm_sampling.best_view(scene, Q, axis, reach)
         if found is None:
             return ("no free scan configuration was found",)
         values = {

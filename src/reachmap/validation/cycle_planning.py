@@ -13,7 +13,7 @@ from reachmap.runtime.job import Job
 from reachmap.runtime.options import RunOptions
 from reachmap.runtime.progress import Progress
 from reachmap.runtime.run import run
-from reachmap.scans.cycle.fresh import FreshCycles
+from reachmap.scans.cycle.from_scratch import FreshCycles
 from reachmap.scans.cycle.scenes import CycleScenes
 from reachmap.scans.measured import attempt_seed
 from reachmap.validation.picks import tool_poses
