@@ -66,8 +66,7 @@ def connected_grasps(scene: Scene, stages: Stages) -> BinRoadmap:
     rolls = MoreRolls(scene, stages)
     survey = rolls.groups.share_goals(survey)
     if scene.kinematics.any_roll:
-        ends = survey.way[survey.way_begin + survey.way_size - 1]
-        T_goal = scene.kinematics.forward_many(ends)
+        T_goal = scene.kinematics.forward_many(survey.grasps)
         axis = scene.loaded.cell.robot.tcp.approach_axis
         measured = rolls.groups.measured(survey, axis, T_goal)
         return connected_goals(scene, stages, "connect", measured)

@@ -83,6 +83,11 @@ class Survey:
         return self.way[self.way_begin]
 
     @cached_property
+    def grasps(self) -> FloatArray:
+        """Where approaches end: configurations at the frames, shape (goals, dof)."""
+        return self.way[self.way_begin + self.way_size - 1]
+
+    @cached_property
     def roadmap_goals(self) -> Goals:
         """Goals of a roadmap, with the room that their approaches need."""
         Q = self.goals

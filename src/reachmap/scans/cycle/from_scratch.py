@@ -72,8 +72,7 @@ class FreshCycles:
         )
         if not len(survey.frame):
             return FreshCycle(StageStatus.NOT_ATTEMPTED)
-        ends = survey.way[survey.way_begin + survey.way_size - 1]
-        lifts = [self._lifts.of(q) for q in ends]
+        lifts = [self._lifts.of(q) for q in survey.grasps]
         good = [k for k, lift in enumerate(lifts) if len(lift.way)]
         if not good:
             states = (lift.status for lift in lifts)

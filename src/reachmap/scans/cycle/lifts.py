@@ -124,14 +124,13 @@ def lift_in_stages(
     phase: str,
 ) -> LiftSurvey:
     """Lift the part from some goals of a survey."""
-    ends = survey.way[survey.way_begin + survey.way_size - 1]
-    context = LiftContext(loaded=loaded, body_pairs=body_pairs, Q=ends[rows])
+    context = LiftContext(loaded=loaded, body_pairs=body_pairs, Q=survey.grasps[rows])
     payloads = stages.run(
         phase,
         Job(function=lift_unit, prepare=prepare, context=context),
         [(part.start, part.stop) for part in blocks(len(rows), LIFTS_PER_UNIT)],
     )
-    dof = ends.shape[1]
+    dof = survey.way.shape[1]
     blank = LiftSurvey.blank(len(survey.frame), dof)
     return blank.with_lifts(LiftSurvey.join(payloads, dof), rows)
 

@@ -111,9 +111,9 @@ def quicker_goals(
     axis = loaded.cell.robot.tcp.approach_axis
     before = np.array([way[0] for way, _ in placing])
     after = np.array([retreat[-1] for _, retreat in placing])
-    ends = survey.way[survey.way_begin + survey.way_size - 1]
     own_s = np.full(len(groups.T), np.inf)
-    np.minimum.at(own_s, survey.frame, least_cycles_s(scenes, ends, before, after))
+    own_cycles_s = least_cycles_s(scenes, survey.grasps, before, after)
+    np.minimum.at(own_s, survey.frame, own_cycles_s)
     T = groups.turned(reached, groups.turns, axis)
     context = QuickerContext(
         loaded=loaded,
