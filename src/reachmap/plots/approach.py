@@ -26,9 +26,11 @@ from reachmap.plots.parts.style import (
     MUTED,
     axes_at,
     drawing,
+    fit_scale,
     new_figure,
     put_text,
     put_title,
+    subtitle_of,
 )
 from reachmap.sampling.orientations import approach_directions
 
@@ -167,7 +169,7 @@ def draw_approach(bin_map: BinMap, layer: int = 0) -> Figure:
     """Draw a sunburst of the states of all orientations at each point of a layer."""
     view = view_of(bin_map)
     low, high = view.view()
-    scale_in = min(WIDEST / (high[0] - low[0]), TALLEST / (high[1] - low[1]))
+    scale_in = fit_scale(low, high, WIDEST, TALLEST)
     width, height = (high - low) * scale_in
     figure = new_figure(LEFT + width + RIGHT, BOTTOM + height + TOP)
     axes = axes_at(figure, LEFT, BOTTOM, width, height)
@@ -201,7 +203,7 @@ def draw_approach(bin_map: BinMap, layer: int = 0) -> Figure:
         figure,
         LEFT,
         "Which approach directions and rolls work where",
-        " · ".join(part for part in said if part),
+        subtitle_of(said),
     )
     return figure
 

@@ -35,7 +35,9 @@ from reachmap.plots.parts.style import (
     axes_at,
     colour_map,
     drawing,
+    fit_scale,
     fit_width,
+    grid_lines,
     new_figure,
     put_text,
     put_title,
@@ -70,7 +72,7 @@ def _draw_places(placement: BasePlacement, percent_map: PercentMap) -> Figure:
     ]
     points = np.concatenate(near)
     low, high = points.min(axis=0) - ROOM_M, points.max(axis=0) + ROOM_M
-    scale = min(WIDEST / (high[0] - low[0]), TALLEST / (high[1] - low[1]))
+    scale = fit_scale(low, high, WIDEST, TALLEST)
     width, height = (high - low) * scale
     figure = new_figure(LEFT + max(width, 3.6) + RIGHT, BOTTOM + height + TOP)
     axes = axes_at(figure, LEFT, BOTTOM, width, height)
@@ -210,7 +212,7 @@ def _draw_rail(placement: BasePlacement) -> Figure:
     axes.set_xlabel(f"{placement.rail} [m]")
     axes.set_ylabel("percent")
     axes.set_ylim(0.0, 104.0)
-    axes.grid(axis="y", color="#e4e4e4", linewidth=0.7)
+    grid_lines(axes)
     handles, _ = axes.get_legend_handles_labels()
     _write_text(figure, placement, handles)
     return figure

@@ -32,6 +32,7 @@ from reachmap.plots.parts.style import (
     drawing,
     new_figure,
     put_title,
+    subtitle_of,
 )
 
 LEFT, RIGHT, TOP, BOTTOM = 0.80, 0.95, 1.05, 0.60
@@ -144,7 +145,7 @@ def _share_text(bin_map: BinMap, layer: int, attempts: int) -> str:
 
 def _subtitle(view: BinView, layer: int) -> str:
     parts = ("seen from above", view.layer_text(layer), view.cell_name)
-    return " · ".join(part for part in parts if part)
+    return subtitle_of(parts)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -20,6 +20,7 @@ from reachmap.plots.parts.style import (
     drawing,
     new_figure,
     put_title,
+    subtitle_of,
 )
 
 PAIRS_SHOWN = 10
@@ -68,7 +69,7 @@ def draw_causes(record: WorkspaceMap | BinMap) -> Figure:
         figure,
         0.35,
         f"{reached:.1f} % reached; causes of the rest",
-        " · ".join(part for part in said if part),
+        subtitle_of(said),
     )
     return figure
 

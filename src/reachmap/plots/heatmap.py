@@ -32,6 +32,7 @@ from reachmap.plots.parts.style import (
     PercentMap,
     axes_at,
     drawing,
+    fit_scale,
     new_figure,
     put_title,
 )
@@ -48,7 +49,7 @@ def draw_level(
 ) -> Figure:
     """Draw one level with its numbers, the cell's outlines, legend and colour bar."""
     low, high = stack.view()
-    scale_in = min(WIDEST / (high[0] - low[0]), TALLEST / (high[1] - low[1]))
+    scale_in = fit_scale(low, high, WIDEST, TALLEST)
     width, height = (high - low) * scale_in
     handles = _legend_handles(stack, level)
     columns = max(2, int((width + RIGHT) / 1.75))

@@ -20,8 +20,10 @@ from reachmap.plots.parts.style import (
     PercentMap,
     axes_at,
     drawing,
+    fit_scale,
     new_figure,
     put_title,
+    subtitle_of,
 )
 
 LEFT, RIGHT, TOP, BOTTOM = 0.75, 0.75, 0.48, 0.85
@@ -33,7 +35,7 @@ WIDEST, TALLEST = 3.2, 3.6
 def draw_overview(stack: LevelStack, *, percent_map: PercentMap = "RdYlGn") -> Figure:
     """Draw all levels small; the best one is framed, the last panel shows the means."""
     low, high = stack.view()
-    scale_in = min(WIDEST / (high[0] - low[0]), TALLEST / (high[1] - low[1]))
+    scale_in = fit_scale(low, high, WIDEST, TALLEST)
     width, height = (high - low) * scale_in
     panels = stack.z.size + 1
     columns = sheet_columns(panels, width / height)
@@ -68,7 +70,7 @@ def draw_overview(stack: LevelStack, *, percent_map: PercentMap = "RdYlGn") -> F
     left, bottom = panel(panels - 1)
     _draw_means(axes_at(figure, left + 0.55, bottom, width - 0.55, height), stack)
     name = QUANTITY_NAMES[stack.quantity]
-    said = " · ".join(part for part in (best_text(stack), stack.cell_name) if part)
+    said = subtitle_of((best_text(stack), stack.cell_name))
     put_title(figure, LEFT, f"{name[0].upper()}{name[1:]} on all levels", said)
     _draw_legend(figure, stack, columns * across)
     return figure

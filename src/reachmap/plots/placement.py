@@ -39,6 +39,7 @@ from reachmap.plots.parts.style import (
     axes_at,
     colour_map,
     drawing,
+    fit_scale,
     fit_width,
     new_figure,
     put_text,
@@ -76,7 +77,7 @@ def draw_placement(
     workspace = None if workspace is None else levels_of(workspace)
     stack = _stack(placement, workspace, context)
     low, high = _view(placement, stack)
-    scale_in = min(WIDEST / (high[0] - low[0]), TALLEST / (high[1] - low[1]))
+    scale_in = fit_scale(low, high, WIDEST, TALLEST)
     width, height = (high - low) * scale_in
     count = 1 if workspace is None else 2
     bottom = BOTTOM if count == 2 else BOTTOM + 0.95

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from reachmap._typing import CodeArray, FloatArray, IntArray
-from reachmap.cell.model.cell import Cell
 from reachmap.cell.model.tool import LISTED
 from reachmap.core.planning.timing import path_length_rad
 from reachmap.maps import BinMap, PathStore, RunInfo, Stamp, Status
@@ -25,7 +24,7 @@ from reachmap.maps.parts import (
 from reachmap.maps.records import NO_PAIR
 from reachmap.sampling.frames import approach_distance_m, bin_test_frames
 from reachmap.scans.cycle.results import CycleResults
-from reachmap.scans.document import provenance_from_document
+from reachmap.scans.document import cell_of_document, provenance_from_document
 from reachmap.scans.measured import MEASURED, SECONDS_PER_CHECK
 
 NO_PATH = -2
@@ -190,7 +189,7 @@ def assemble_bin_map(
     refinement : Refinement, optional
         What is known between the test grasps.
     """
-    cell = Cell.model_validate_json(document["provenance"]["cell_resolved_json"])
+    cell = cell_of_document(document)
     T_base_bin = cell.T_base_bin()
     grid = bin_test_frames(cell, T_base_bin)
     shape = grid.frames.shape

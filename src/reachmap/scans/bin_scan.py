@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from reachmap._typing import FloatArray
-from reachmap.cell.model.cell import Cell
 from reachmap.core.collision.held_part import HeldPart
 from reachmap.core.planning.planner import PlanResult
 from reachmap.core.planning.timing import path_length_rad
@@ -32,7 +31,7 @@ from reachmap.scans.cycle.planning import CycleKnowledge, CyclePlan, CyclePlanne
 from reachmap.scans.cycle.results import CycleResults
 from reachmap.scans.cycle.scenes import CycleScenes, stages_of
 from reachmap.scans.cycle.stages import whole_cycles
-from reachmap.scans.document import journal_settings
+from reachmap.scans.document import cell_of_document, journal_settings
 from reachmap.scans.ik_survey import Survey
 from reachmap.scans.margins import MarginMeter
 from reachmap.scans.measured import MEASURED, Meter
@@ -354,9 +353,7 @@ def tally(payload: Mapping[str, Any]) -> tuple[int, int]:
 
 def blank(document: Mapping[str, Any], unit: int, status: Status) -> dict[str, Any]:
     """Payload of a unit without results."""
-    spec = Cell.model_validate_json(
-        document["provenance"]["cell_resolved_json"]
-    ).bin_scan
+    spec = cell_of_document(document).bin_scan
     each = document["grasps"] // document.get("fillings", 1)
     left = each - unit % -(-each // GRASPS_PER_UNIT) * GRASPS_PER_UNIT
     empty = GraspResults.blank(

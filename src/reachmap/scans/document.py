@@ -6,6 +6,7 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from reachmap.cell.model.cell import Cell
 from reachmap.core.scene import Scene
 from reachmap.maps import Provenance, Stamp, collect_provenance, config_sha256
 
@@ -88,6 +89,11 @@ def journal_settings(document: Mapping[str, Any]) -> dict[str, Any]:
         "source": document["provenance"]["source_sha256"],
         **document["provenance"]["settings"],
     }
+
+
+def cell_of_document(document: Mapping[str, Any]) -> Cell:
+    """Cell of a scan, as resolved."""
+    return Cell.model_validate_json(document["provenance"]["cell_resolved_json"])
 
 
 def provenance_from_document(document: Mapping[str, Any]) -> Provenance:

@@ -85,7 +85,7 @@ class Survey:
     @cached_property
     def grasps(self) -> FloatArray:
         """Where approaches end: configurations at the frames, shape (goals, dof)."""
-        return self.way[self.way_begin + self.way_size - 1]
+        return np.asarray(self.way[self.way_begin + self.way_size - 1])
 
     @cached_property
     def roadmap_goals(self) -> Goals:

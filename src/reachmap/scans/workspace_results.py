@@ -23,7 +23,7 @@ from reachmap.maps import (
 from reachmap.maps.parts import Components, freeze
 from reachmap.runtime.job import Kind
 from reachmap.sampling.frames import CubeFrames, workspace_frames
-from reachmap.scans.document import provenance_from_document
+from reachmap.scans.document import cell_of_document, provenance_from_document
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -94,7 +94,7 @@ def tally(payload: Mapping[str, Any]) -> tuple[int, int]:
 
 def blank(document: Mapping[str, Any], unit: int, status: Status) -> dict[str, Any]:
     """Payload of a unit without results."""
-    cell = Cell.model_validate_json(document["provenance"]["cell_resolved_json"])
+    cell = cell_of_document(document)
     size = document["frames_per_unit"]
     left = frames_of_cell(cell) - unit * size
     dof = len(document["joint_names"])
@@ -117,7 +117,7 @@ def assemble(
     parts = [dict(payload) for payload in payloads]
     evidence = parts[0].pop("components", None)
     results = FrameResults.join([FrameResults(**part) for part in parts])
-    cell = Cell.model_validate_json(document["provenance"]["cell_resolved_json"])
+    cell = cell_of_document(document)
     maps: dict[str, CubeMap] = {}
     begin = 0
     for cube in workspace_frames(cell):

@@ -22,6 +22,7 @@ from reachmap.plots.parts.style import (
     new_figure,
     put_text,
     put_title,
+    subtitle_of,
 )
 from reachmap.text import plural
 
@@ -70,7 +71,7 @@ def draw_emptied(
     )
     more = f"the first {len(shown)} of {len(heaps)} heaps"
     of = "" if len(shown) == len(heaps) else more
-    put_title(figure, SIDE_IN, title, " · ".join(t for t in (of, view.cell_name) if t))
+    put_title(figure, SIDE_IN, title, subtitle_of((of, view.cell_name)))
     return figure
 
 

@@ -13,8 +13,10 @@ from reachmap.plots.parts.style import (
     MUTED,
     axes_at,
     drawing,
+    grid_lines,
     new_figure,
     put_title,
+    subtitle_of,
 )
 
 LINES = (
@@ -59,7 +61,7 @@ def draw_emptying(bin_map: BinMap, emptying: Emptying) -> Figure:
     axes.set_ylim(0.0, 104.0)
     axes.set_xlabel("height of the parts above the bottom [mm]")
     axes.set_ylabel("reached [%]")
-    axes.grid(axis="y", color="#e4e4e4", linewidth=0.7)
+    grid_lines(axes)
     axes.set_axisbelow(True)
     axes.legend(loc="lower left", fontsize=8.5, frameon=False)
     for spine in ("top", "right"):
@@ -74,6 +76,6 @@ def draw_emptying(bin_map: BinMap, emptying: Emptying) -> Figure:
         figure,
         0.85,
         title[0].upper() + title[1:],
-        " · ".join(part for part in said if part),
+        subtitle_of(said),
     )
     return figure

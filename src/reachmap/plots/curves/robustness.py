@@ -12,6 +12,7 @@ from reachmap.plots.parts.style import (
     MUTED,
     axes_at,
     drawing,
+    grid_lines,
     new_figure,
     put_title,
 )
@@ -55,7 +56,7 @@ def draw_robustness(record: Robustness) -> Figure:
     axes.set_ylim(0.0, 104.0)
     axes.set_xlabel(f"size of the errors; 1 is {errors_text(summary.errors)}")
     axes.set_ylabel("test grasps [%]")
-    axes.grid(axis="y", color="#e4e4e4", linewidth=0.7)
+    grid_lines(axes)
     axes.set_axisbelow(True)
     axes.legend(loc="lower left", fontsize=8.5, frameon=False)
     for spine in ("top", "right"):

@@ -15,8 +15,10 @@ from reachmap.plots.parts.style import (
     MUTED,
     axes_at,
     drawing,
+    grid_lines,
     new_figure,
     put_title,
+    subtitle_of,
 )
 
 # Points with their number written beside them; more would run into each other.
@@ -43,7 +45,7 @@ def draw_saturation(bin_map: BinMap) -> Figure:
         title = f"{data.share[0]:.2f} % after 1 attempt, {title}"
     cell_name = view_of(bin_map).cell_name
     said = (f"{data.total} test grasps", "bars: Wilson 95 % intervals", cell_name)
-    put_title(figure, 0.85, title, " · ".join(part for part in said if part))
+    put_title(figure, 0.85, title, subtitle_of(said))
     return figure
 
 
@@ -94,7 +96,7 @@ def _set_limits(axes: Axes, data: Saturation) -> None:
     axes.set_xticks(data.attempts)
     axes.set_xlabel("attempts per test grasp")
     axes.set_ylabel("test grasps reached [%]")
-    axes.grid(axis="y", color="#e4e4e4", linewidth=0.7)
+    grid_lines(axes)
     axes.set_axisbelow(True)
     for spine in ("top", "right"):
         axes.spines[spine].set_visible(False)

@@ -16,8 +16,10 @@ from reachmap.plots.parts.style import (
     MUTED,
     axes_at,
     drawing,
+    grid_lines,
     new_figure,
     put_title,
+    subtitle_of,
 )
 from reachmap.plots.ranking import part_colours, term_label
 
@@ -60,7 +62,7 @@ def draw_timeline(bin_map: BinMap, cycle: CycleSummary) -> Figure:
     axes.set_xlim(0.0, 1.14 * begin)
     axes.tick_params(axis="y", length=0)
     axes.set_xlabel("time from the scan configuration [s]")
-    axes.grid(axis="x", color="#e4e4e4", linewidth=0.7)
+    grid_lines(axes, "x")
     axes.set_axisbelow(True)
     axes.axvline(begin, color=MUTED, linewidth=1.0, linestyle=":")
     for spine in ("top", "right", "left"):
@@ -73,6 +75,6 @@ def draw_timeline(bin_map: BinMap, cycle: CycleSummary) -> Figure:
         figure,
         0.75,
         title[0].upper() + title[1:],
-        " · ".join(part for part in said if part),
+        subtitle_of(said),
     )
     return figure

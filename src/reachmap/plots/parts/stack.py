@@ -19,7 +19,12 @@ from reachmap.plots.parts.levels import (
 )
 from reachmap.plots.parts.outlines import Outline
 from reachmap.plots.parts.squares import MINUS, cell_edges
-from reachmap.plots.parts.style import DIFFERENCE_MAP, PercentMap, colour_map
+from reachmap.plots.parts.style import (
+    DIFFERENCE_MAP,
+    PercentMap,
+    colour_map,
+    subtitle_of,
+)
 
 # Bodies larger than this are cut at the edge of the picture instead of widening it.
 LARGE_BODY = 0.6
@@ -143,7 +148,7 @@ def level_subtitle(stack: LevelStack, level: int) -> str:
     word = "largest gap" if stack.quantity == "difference" else "best level"
     is_best = level == best_level(stack.values)
     said = f"this is the {word} of {stack.z.size}" if is_best else best_text(stack)
-    return " · ".join(part for part in (said, stack.cell_name) if part)
+    return subtitle_of((said, stack.cell_name))
 
 
 def _overlap(a: FloatArray, b: FloatArray) -> bool:

@@ -8,7 +8,7 @@ and the display play no part, so the same map gives the same bytes.
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any, Literal, TypeAlias
 
@@ -101,6 +101,23 @@ def put_text(figure: Figure, left: float, bottom: float, text: str, **how: Any) 
     """Write text on a figure at a place given in inches from its lower left."""
     width, height = figure.get_size_inches()
     return figure.text(left / width, bottom / height, text, **how)
+
+
+def subtitle_of(parts: Iterable[str]) -> str:
+    """What a subtitle says, part by part; empty parts are left out."""
+    return " · ".join(part for part in parts if part)
+
+
+def grid_lines(axes: Axes, axis: Literal["both", "x", "y"] = "y") -> None:
+    """Draw pale lines across a curve's axes."""
+    axes.grid(axis=axis, color="#e4e4e4", linewidth=0.7)
+
+
+def fit_scale(
+    low: FloatArray, high: FloatArray, widest: float, tallest: float
+) -> float:
+    """Greatest scale at which a view from low to high, (2,) each, fits a size [in]."""
+    return float(min(widest / (high[0] - low[0]), tallest / (high[1] - low[1])))
 
 
 def put_title(figure: Figure, left: float, title: str, subtitle: str = "") -> None:

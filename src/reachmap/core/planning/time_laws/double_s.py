@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from reachmap._typing import FloatArray
-from reachmap.core.planning.timing import merge_straight
+from reachmap.core.planning.timing import merge_straight, with_knots
 
 SAMPLES = 200
 """Instants at which limits along a smooth way are compared; 2000 change the time by
@@ -67,11 +67,9 @@ def smooth_way_time_s(
     the limits as well: stretching by λ divides speeds, accelerations and jerks by λ,
     λ² and λ³. A little longer than the optimum where the curve bends.
     """
-    chords = np.linalg.norm(np.diff(way, axis=0), axis=1)
-    way = way[np.concatenate([[True], chords > 1e-12])]
+    way, knots = with_knots(way)
     if len(way) < 3:
         return polyline_time_s(way, velocity, acceleration, jerk)
-    knots = np.concatenate([[0.0], np.cumsum(chords[chords > 1e-12])])
     # Imported here: splines take long to import, and few commands time a way.
     from scipy.interpolate import CubicSpline
 

@@ -14,6 +14,7 @@ from scipy.interpolate import CubicSpline, PPoly
 
 from reachmap._typing import FloatArray
 from reachmap.core.planning.time_laws.corners import BlendedPath
+from reachmap.core.planning.timing import with_knots
 from reachmap.errors import SettingsError
 
 GRID = 80
@@ -44,11 +45,9 @@ def optimal_way_time_s(
     way: FloatArray, velocity: FloatArray, acceleration: FloatArray
 ) -> float:
     """Shortest time along the smooth curve through a way's points (n, dof) [s]."""
-    chords = np.linalg.norm(np.diff(way, axis=0), axis=1)
-    way = way[np.concatenate([[True], chords > 1e-12])]
+    way, knots = with_knots(way)
     if len(way) < 2:
         return 0.0
-    knots = np.concatenate([[0.0], np.cumsum(chords[chords > 1e-12])])
     return _parametrised_s(CubicSpline(knots, way), velocity, acceleration)
 
 
