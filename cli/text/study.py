@@ -5,10 +5,8 @@ from __future__ import annotations
 import textwrap
 
 from reachmap.cli.text.tables import table_lines
-from reachmap.maps.study.record import OBJECTIVES
+from reachmap.maps.study.words import estimate_text
 from reachmap.maps.summary.study import (
-    UNIT_WORDS,
-    Estimate,
     MainEffect,
     StudySummary,
     VariantSummary,
@@ -38,17 +36,6 @@ def study_lines(summary: StudySummary) -> list[str]:
     ]
 
 
-def estimate_text(name: str, item: Estimate) -> str:
-    """A value with its interval: ``69.1 % (66.2 … 71.8)``."""
-    if item.value != item.value:
-        return "-"
-    digits = 1 if OBJECTIVES[name] == "percent" else 3
-    text = f"{item.value:.{digits}f} {UNIT_WORDS[OBJECTIVES[name]]}"
-    if item.low != item.low:
-        return text
-    return f"{text} ({item.low:.{digits}f} … {item.high:.{digits}f})"
-
-
 def _best_lines(summary: StudySummary) -> list[str]:
     lines = [f"base: {summary.variants[summary.base].assignment}"]
     if summary.requirements:
@@ -56,8 +43,7 @@ def _best_lines(summary: StudySummary) -> list[str]:
     for word, row in (("best", summary.best), ("runner-up", summary.runner_up)):
         if row >= 0:
             variant = summary.variants[row]
-            name, item = next(iter(variant.objectives.items()))
-            said = estimate_text(name, item)
+            name, said = next(iter(variant.objectives)), variant.estimates()[0]
             lines.append(f"{word}: {variant.assignment}: {name} {said}")
     if summary.best < 0:
         lines.append("best: none, no variant meets the requirements")
@@ -69,11 +55,8 @@ def _best_lines(summary: StudySummary) -> list[str]:
 
 
 def _sentence_lines(summary: StudySummary) -> list[str]:
-    """Changes from the base, those of a single parameter first."""
-    found = [
-        text for variant in summary.variants for text in variant.sentences.values()
-    ]
-    found.sort(key=lambda text: text.count(" → "))
+    """Changes from the base."""
+    found = summary.sentences()
     if not found:
         return []
     rest = len(found) - SENTENCES_SHOWN
@@ -109,12 +92,7 @@ def _effect_rows(effect: MainEffect) -> list[list[str]]:
             f"{effect.parameter}{unit}" if k == 0 else "",
             effect.labels[k],
             estimate_text(
-                effect.objective,
-                Estimate(
-                    value=float(effect.mean[k]),
-                    low=float(effect.low[k]),
-                    high=float(effect.high[k]),
-                ),
+                effect.objective, effect.mean[k], effect.low[k], effect.high[k]
             ),
         ]
         for k in range(min(len(effect.values), LEVELS_SHOWN))
@@ -129,24 +107,14 @@ def _table(summary: StudySummary) -> list[str]:
     rows += [
         [
             variant.assignment,
-            *(estimate_text(name, variant.objectives[name]) for name in names),
-            _role(summary, variant),
+            *variant.estimates(),
+            summary.role(variant),
         ]
         for variant in summary.variants[:VARIANTS_SHOWN]
     ]
     rest = len(summary.variants) - VARIANTS_SHOWN
     more = [f"  and {rest} more (--json has all)"] if rest > 0 else []
     return ["", "Variants", *table_lines(rows, "<" + ">" * len(names) + "<"), *more]
-
-
-def _role(summary: StudySummary, variant: VariantSummary) -> str:
-    roles = {"runner_up": "runner-up", "base": "base", "best": "best"}
-    found = [w for k, w in roles.items() if getattr(summary, k) == variant.variant]
-    if variant.status != "done":
-        found.append(variant.status.replace("_", " "))
-    elif not variant.feasible:
-        found.append("below the requirements")
-    return ", ".join(found)
 
 
 def _cause_lines(summary: StudySummary) -> list[str]:

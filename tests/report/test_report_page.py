@@ -15,8 +15,8 @@ from click.testing import CliRunner, Result
 from reachmap.cli import group
 from reachmap.maps import write_bin_map, write_workspace_map
 from reachmap.maps.study.format import read_study
+from reachmap.maps.study.words import sentence
 from reachmap.maps.summary.statistics import saturation_of
-from reachmap.maps.summary.study import sentence
 from reachmap.report.page import CONTENTS
 from tests.support.synthetic_maps import synthetic_bin_map, synthetic_provenance
 from tests.support.toy_artefacts import toy_bin_map, toy_workspace

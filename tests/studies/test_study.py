@@ -17,7 +17,8 @@ from reachmap.errors import CellError, SettingsError
 from reachmap.maps.comparison.significance import paired_interval, paired_means
 from reachmap.maps.study.format import read_study
 from reachmap.maps.study.record import Study
-from reachmap.maps.summary.study import main_effect, sentence
+from reachmap.maps.study.words import sentence
+from reachmap.maps.summary.study import main_effect
 from reachmap.runtime.options import RunOptions
 from reachmap.runtime.store import store_path
 from reachmap.tools.bin_scan import bin_scan

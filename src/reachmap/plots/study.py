@@ -9,13 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from reachmap.maps.study.record import LOWER_IS_BETTER, OBJECTIVES, Study
-from reachmap.maps.summary.study import (
-    UNIT_WORDS,
-    MainEffect,
-    changes_text,
-    main_effect,
-    value_texts,
-)
+from reachmap.maps.study.words import UNIT_WORDS, changes_text, value_texts
+from reachmap.maps.summary.study import MainEffect, main_effect
 from reachmap.plots.parts.squares import (
     PERCENT_SCALE,
     cell_edges,

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from reachmap._typing import BoolArray, FloatArray
 from reachmap.maps.study.record import LOWER_IS_BETTER, OBJECTIVES, Study
-from reachmap.maps.summary.study import UNIT_WORDS, changes_text
+from reachmap.maps.study.words import UNIT_WORDS, changes_text
 from reachmap.plots.parts.squares import PERCENT_SCALE, colour_bar
 from reachmap.plots.parts.style import (
     BIN_COLOUR,

@@ -6,6 +6,7 @@ import numpy as np
 
 from reachmap.maps.cycle.summary import summarise_cycle
 from reachmap.maps.study.record import Study
+from reachmap.maps.study.words import changes_text, sentence
 from reachmap.maps.summary.clearance import clearance_shares
 from reachmap.maps.summary.directions import reached_shares
 from reachmap.maps.summary.emptying import emptying_of
@@ -16,7 +17,6 @@ from reachmap.maps.summary.statistics import (
     level_means,
     saturation_of,
 )
-from reachmap.maps.summary.study import changes_text, sentence
 from reachmap.report.blocks import Tile
 from reachmap.report.folder import RunFolder
 from reachmap.report.numbers import count, interval, number, percent, signed

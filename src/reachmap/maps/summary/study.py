@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
 
 import numpy as np
 
 from reachmap._typing import FloatArray
-from reachmap.maps.study.record import OBJECTIVES, STATES, Study, VariantStatus
-
-UNIT_WORDS = {"percent": "%", "rad": "rad", "s": "s"}
-CHANGE_WORDS = {"percent": "points", "rad": "rad", "s": "s"}
+from reachmap.maps.study.record import STATES, Study, VariantStatus
+from reachmap.maps.study.words import estimate_text, sentence, value_texts
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,6 +42,13 @@ class VariantSummary:
     feasible: bool
     objectives: dict[str, Estimate]
     sentences: dict[str, str]
+
+    def estimates(self) -> list[str]:
+        """Each objective with its interval, in words."""
+        return [
+            estimate_text(name, item.value, item.low, item.high)
+            for name, item in self.objectives.items()
+        ]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -87,6 +91,35 @@ class StudySummary:
     requirements: tuple[str, ...]
     variants: tuple[VariantSummary, ...]
     main_effects: tuple[MainEffect, ...]
+
+    def sentences(self) -> list[str]:
+        """All changes from the base: the best variant's, then those of one parameter.
+
+        The others follow, those of few parameters first.
+        """
+        found = [
+            (variant.variant != self.best, text.count(" → "), text)
+            for variant in self.variants
+            for text in variant.sentences.values()
+        ]
+        return [text for *_, text in sorted(found, key=lambda item: item[:2])]
+
+    def role(self, variant: VariantSummary) -> str:
+        """What a variant is in the study: base, best, failed; "" for nothing."""
+        roles = [
+            word
+            for word, row in (
+                ("base", self.base),
+                ("best", self.best),
+                ("runner-up", self.runner_up),
+            )
+            if row == variant.variant
+        ]
+        if variant.status != "done":
+            roles.append(variant.status.replace("_", " "))
+        elif not variant.feasible:
+            roles.append("below the requirements")
+        return ", ".join(roles)
 
 
 def summarise_study(study: Study) -> StudySummary:
@@ -132,56 +165,6 @@ def _variant(study: Study, row: int) -> VariantSummary:
             if row != study.base and study.done[row] and study.done[study.base]
         },
     )
-
-
-def value_texts(study: Study, row: int) -> list[str]:
-    """Value of each parameter as the variant sets it, in words."""
-    names = [re.escape(name) for name in study.parameter_names]
-    pattern = ", ".join(f"{name}=(.*)" for name in names)
-    found = re.fullmatch(pattern, study.assignment[row], re.DOTALL)
-    if found is None:
-        return [f"{value:g}" for value in study.parameter[row]]
-    return [
-        text if unit == "choice" else f"{value:.6g}"
-        for text, unit, value in zip(
-            found.groups(), study.parameter_units, study.parameter[row], strict=True
-        )
-    ]
-
-
-def changes_text(study: Study, row: int) -> str:
-    """Which parameters differ from the base: ``tube_length 0.119 → 0.319``."""
-    before, after = value_texts(study, study.base), value_texts(study, row)
-    return ", ".join(
-        f"{name} {old} → {new}"
-        for name, old, new in zip(study.parameter_names, before, after, strict=True)
-        if old != new
-    )
-
-
-def sentence(study: Study, row: int, objective: int) -> str:
-    """The change of a variant and its significance, as a sentence."""
-    name = study.objective_names[objective]
-    word = CHANGE_WORDS[OBJECTIVES[name]]
-    digits = 1 if word == "points" else 3
-    middle = float(study.change[row, objective])
-    change = _signed(middle, digits)
-    what = f"{changes_text(study, row)}: {name} "
-    if not study.pairs[row, objective]:
-        return f"{what}cannot be compared, no test frame is shared with the base"
-    if np.isnan(study.change_low[row, objective]):
-        return f"{what}{change} {word}, too few frames for an interval"
-    low, high = study.change_low[row, objective], study.change_high[row, objective]
-    half = f"{max(middle - low, high - middle):.{digits}f}"
-    if study.significant[row, objective]:
-        return f"{what}{change} ± {half} {word}"
-    if not low <= 0.0 <= high:
-        return f"{what}{change} ± {half} {word}, not significant across the study"
-    return f"{what}{change} {word}, not distinguishable from {half} of noise"
-
-
-def _signed(value: float, digits: int) -> str:
-    return f"{value + 0.0:+.{digits}f}".replace("-", "−")
 
 
 def main_effect(study: Study, parameter: int, objective: int) -> MainEffect:

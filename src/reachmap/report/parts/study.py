@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator
 
-from reachmap.maps.study.record import LOWER_IS_BETTER, OBJECTIVES, Study
+from reachmap.maps.study.record import LOWER_IS_BETTER, Study
 from reachmap.maps.summary.study import (
-    Estimate,
     StudySummary,
     VariantSummary,
     summarise_study,
@@ -26,7 +25,7 @@ from reachmap.report.blocks import (
     section,
     table,
 )
-from reachmap.report.numbers import NONE, count, number
+from reachmap.report.numbers import NONE, count
 
 # A page is read, a file is searched: what is beyond this stands in study.h5.
 ROWS, SENTENCES, CAUSES = 40, 12, 8
@@ -61,16 +60,6 @@ def study_section(study: Study) -> Section:
     )
 
 
-def estimate_text(objective: str, item: Estimate) -> str:
-    """A value with its interval: ``69.1 % (66.2 to 71.8)``."""
-    unit = OBJECTIVES[objective]
-    digits = 1 if unit == "percent" else 3
-    said = number(item.value, digits, "%" if unit == "percent" else unit)
-    if item.low != item.low:
-        return said
-    return f"{said} ({number(item.low, digits)} to {number(item.high, digits)})"
-
-
 def _words(summary: StudySummary) -> list[Block]:
     outcomes = (
         (summary.failed, "failed"),
@@ -101,21 +90,13 @@ def _words(summary: StudySummary) -> list[Block]:
 
 
 def _told(variant: VariantSummary) -> str:
-    name, item = next(iter(variant.objectives.items()))
-    return f"{variant.assignment}: {name} {estimate_text(name, item)}"
+    name, said = next(iter(variant.objectives)), variant.estimates()[0]
+    return f"{variant.assignment}: {name} {said}"
 
 
 def _sentences(summary: StudySummary) -> Block:
-    """The best variant's, then those that change a single parameter."""
-    rows = [summary.best] if summary.best >= 0 else []
-    rows += [row for row in range(len(summary.variants)) if row != summary.best]
-    found = [
-        (text, row == summary.best)
-        for row in rows
-        for text in summary.variants[row].sentences.values()
-    ]
-    found.sort(key=lambda item: (not item[1], item[0].count(" → ")))
-    items: list[tuple[object, ...]] = [(text,) for text, _ in found[:SENTENCES]]
+    found = summary.sentences()
+    items: list[tuple[object, ...]] = [(text,) for text in found[:SENTENCES]]
     if len(found) > SENTENCES:
         items.append((f"and {len(found) - SENTENCES} more in the study's file",))
     return Bullets(tuple(items)) if items else paragraph("None can be compared.")
@@ -143,8 +124,8 @@ def _table(study: Study, summary: StudySummary) -> list[Block]:
         [
             (
                 variant.assignment,
-                *(estimate_text(name, variant.objectives[name]) for name in names),
-                _role(summary, variant),
+                *variant.estimates(),
+                summary.role(variant) or NONE,
             )
             for variant in rows[:ROWS]
         ],
@@ -154,23 +135,6 @@ def _table(study: Study, summary: StudySummary) -> list[Block]:
     if rest <= 0:
         return [shown]
     return [shown, paragraph(f"and {rest} more in the study's file")]
-
-
-def _role(summary: StudySummary, variant: VariantSummary) -> str:
-    roles = [
-        word
-        for word, row in (
-            ("base", summary.base),
-            ("best", summary.best),
-            ("runner-up", summary.runner_up),
-        )
-        if row == variant.variant
-    ]
-    if variant.status != "done":
-        roles.append(variant.status.replace("_", " "))
-    elif not variant.feasible:
-        roles.append("below the requirements")
-    return ", ".join(roles) or NONE
 
 
 def _causes(summary: StudySummary) -> list[Block]:
