@@ -28,7 +28,8 @@ def base_lines(summary: BaseSummary) -> list[str]:
         lines += ["", "Best of each arm and mounting", *table_lines(best, "<<><")]
     lines += ["", *_gain_lines(summary)]
     if summary.margin:
-        lines.append(f"margin (score within 5 points): {margin_text(summary.margin)}")
+        margin = margin_text(summary.margin, summary.rail)
+        lines.append(f"margin (score within 5 points): {margin}")
     lines.append(
         f"{plural(summary.candidates, 'place')} considered, {summary.exact} with "
         f"paths, {sum(summary.excluded.values())} excluded"

@@ -195,7 +195,12 @@ def _draw_rail(placement: BasePlacement) -> Figure:
     known = ~np.isnan(placement.score)
     rows = np.flatnonzero(known & ~exact)
     rows = rows[np.argsort(at[rows], kind="stable")]
-    axes.plot(at[rows], placement.score[rows], color=MUTED, label="bound")
+    axes.plot(
+        at[rows],
+        placement.score[rows],
+        color=MUTED,
+        label="bound (inverse kinematics, collisions)",
+    )
     rows = np.flatnonzero(known & exact)
     axes.errorbar(
         at[rows],
@@ -205,12 +210,12 @@ def _draw_rail(placement: BasePlacement) -> Figure:
         color=INK,
         markersize=4,
         capsize=3,
-        label="path reachability (bars: 95 % intervals)",
+        label="with paths (bars: 95 % intervals)",
     )
     k = placement.chosen
     axes.plot([at[k]], [placement.score[k]], "o", color=BIN_COLOUR, label="chosen")
     axes.set_xlabel(f"{placement.rail} [m]")
-    axes.set_ylabel("percent")
+    axes.set_ylabel("path reachability [%]")
     axes.set_ylim(0.0, 104.0)
     grid_lines(axes)
     handles, _ = axes.get_legend_handles_labels()

@@ -158,7 +158,8 @@ def _check(choice: RobotChoice) -> None:
     unknown = sorted(set(choice.fixed) - set(AXES))
     if unknown:
         raise SettingsError(f"--fix {unknown[0]}: expected one of {', '.join(AXES)}")
-    check_places(choice.limits, choice.fixed)
+    named = {choice.rail or name: pair for name, pair in choice.limits.items()}
+    check_places(named, choice.fixed)
     for name in choice.mountings:
         try:
             fits = name in LEANS_DEG or 0.0 <= float(name) <= 180.0

@@ -150,10 +150,12 @@ def score_text(candidate: BaseCandidate) -> str:
     return f"{candidate.score:.1f} ± {1.96 * candidate.score_error:.1f} %"
 
 
-def margin_text(margin: dict[str, float]) -> str:
-    """Margins of the base as text."""
+def margin_text(margin: dict[str, float], rail: str) -> str:
+    """Margins of the base as text; those of a rail are named after the joint."""
     return ", ".join(
-        f"{k} {v:.0f}°" if is_turn(k) else f"{k} {1000 * v:.0f} mm"
+        f"{k} {v:.0f}°"
+        if is_turn(k)
+        else f"{k.replace('x', f'{rail} ') if rail else k} {1000 * v:.0f} mm"
         for k, v in margin.items()
     )
 
@@ -179,7 +181,9 @@ def base_sentences(placement: BasePlacement) -> list[str]:
             f"{score_text(summary.runner_up)}"
         )
     if summary.margin:
-        lines.append(f"margin for 5 points: {margin_text(summary.margin)}")
+        lines.append(
+            f"margin for 5 points: {margin_text(summary.margin, summary.rail)}"
+        )
     lines.append(
         f"{plural(summary.candidates, 'place')} considered, {summary.exact} with paths"
     )
