@@ -74,4 +74,12 @@ def test_what_a_cell_does_not_have_is_refused(name, tmp_path):
 )
 def test_of_equal_variants_the_base_is_the_best(costs, base, wanted):
     """A change that gains nothing is not proposed; what failed is never chosen."""
-    assert best_rows(np.array(costs), base) == wanted
+    assert best_rows(np.array(costs)[:, None], base) == wanted
+
+
+def test_of_equal_changes_the_next_objective_decides():
+    """The base stays first; a cost that is not known comes last."""
+    costs = np.array([[1.0, 4.0], [1.0, 3.0], [1.0, 2.0], [1.0, np.nan], [2.0, 0.0]])
+    assert best_rows(costs, 4) == (2, 1)
+    assert best_rows(costs, 0) == (0, 2)
+    assert best_rows(costs[[3, 0]], -1) == (1, 0)

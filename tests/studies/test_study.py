@@ -60,7 +60,7 @@ def test_maps_are_those_of_separate_runs(small: Study, tmp_path: Path) -> None:
         bin_map = read_bin_map(tmp_path / f"bin{row}.h5")
         assert small.bin_sha256[row] == bin_map.stamp.content_sha256
         reached = 100.0 * (bin_map.status == 1).mean()
-        assert small.objective[row, 1] == pytest.approx(reached)
+        assert small.objective[row, 0] == pytest.approx(reached)
 
 
 def test_a_wrong_variant_is_a_row_with_its_cause(small: Study) -> None:

@@ -283,10 +283,12 @@ def study_album(
         items.append(Picture(name=f"effects_{name}", title=title, draw=effects))
         if is_grid and count == 2:
             draw = partial(draw_grid, study, k, percent_map)
-            items.append(Picture(name=f"grid_{name}", title=name, draw=draw))
+            title = f"{name} over both parameters"
+            items.append(Picture(name=f"grid_{name}", title=title, draw=draw))
         elif is_grid and count > 2 and known.any():
             draw = partial(draw_interactions, study, k, percent_map)
-            items.append(Picture(name=f"interactions_{name}", title=name, draw=draw))
+            title = f"{name} over every two parameters"
+            items.append(Picture(name=f"interactions_{name}", title=title, draw=draw))
     first = study.objective_names[0]
     if study.squares is not None and known.any():
         draw = partial(draw_best_maps, study, percent_map)

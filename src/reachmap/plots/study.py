@@ -9,7 +9,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from reachmap.maps.study.record import LOWER_IS_BETTER, OBJECTIVES, Study
-from reachmap.maps.study.words import UNIT_WORDS, changes_text, value_texts
+from reachmap.maps.study.words import (
+    UNIT_WORDS,
+    changes_text,
+    digits_of,
+    value_texts,
+)
 from reachmap.maps.summary.study import MainEffect, main_effect
 from reachmap.plots.parts.squares import (
     PERCENT_SCALE,
@@ -19,6 +24,7 @@ from reachmap.plots.parts.squares import (
 )
 from reachmap.plots.parts.style import (
     BIN_COLOUR,
+    MUTED,
     NOT_ATTEMPTED,
     PercentMap,
     axes_at,
@@ -35,8 +41,9 @@ SQUARE = 0.75
 # More labels than this would run into each other.
 MOST_LABELS = 8
 LABEL = 14
-# Maps side by side: the inches of one, and how many.
-TILE, TILE_HEAD, TILES_ACROSS, TILES_DOWN = 1.9, 0.55, 4, 2
+# Maps side by side: the inches of one and of a line above it, and how many.
+TILE, TILE_LINE, TILES_ACROSS, TILES_DOWN = 1.9, 0.13, 4, 2
+TILE_LINES, TILE_LETTERS = 4, 38
 
 
 @drawing()
@@ -171,6 +178,8 @@ def draw_best_maps(study: Study, percent_map: PercentMap = "RdYlGn") -> Figure:
         study.squares.bin_square,
     )
     rows = best_rows(study)
+    told = [_tile_words(study, row) for row in rows]
+    head = 0.36 + TILE_LINE * max(len(changes) for _, changes in told)
     span = [float(np.ptp(cell_edges(axis))) for axis in (x, y)]
     width = min(TILE, TILE * span[0] / span[1])
     height = width * span[1] / span[0]
@@ -178,12 +187,12 @@ def draw_best_maps(study: Study, percent_map: PercentMap = "RdYlGn") -> Figure:
     lines = -(-len(rows) // columns)
     pitch = max(width, TILE) + GAP
     figure = new_figure(
-        LEFT + columns * pitch + 0.95, 0.3 + lines * (height + TILE_HEAD) + HEAD - 0.3
+        LEFT + columns * pitch + 0.95, 0.3 + lines * (height + head) + HEAD - 0.3
     )
     top = float(figure.get_size_inches()[1]) - HEAD + 0.2
     for place, row in enumerate(rows):
         line, column = divmod(place, columns)
-        left, bottom = LEFT + column * pitch, top - (line + 1) * (height + TILE_HEAD)
+        left, bottom = LEFT + column * pitch, top - (line + 1) * (height + head)
         axes = axes_at(figure, left, bottom, width, height)
         mesh = draw_squares(
             axes,
@@ -196,13 +205,11 @@ def draw_best_maps(study: Study, percent_map: PercentMap = "RdYlGn") -> Figure:
         )
         axes.set_xticks([])
         axes.set_yticks([])
-        _write_above(
-            figure, left, bottom + height, pitch - 0.1, _tile_words(study, row)
-        )
+        _write_above(figure, left, bottom + height, told[place])
     colour_bar(
         figure,
         mesh,
-        (LEFT + columns * pitch, top - height - TILE_HEAD, 0.12, height),
+        (LEFT + columns * pitch, top - height - head, 0.12, height),
         "reached [%]",
     )
     said = "test points of the bin from above, mean over the layers"
@@ -211,21 +218,18 @@ def draw_best_maps(study: Study, percent_map: PercentMap = "RdYlGn") -> Figure:
 
 
 def _write_above(
-    figure: Figure, left: float, top: float, room: float, words: Sequence[str]
+    figure: Figure, left: float, top: float, words: tuple[str, Sequence[str]]
 ) -> None:
-    """Write two lines above a map, set smaller where they have no room [in]."""
-    for number, text in enumerate(words):
-        written = put_text(
-            figure,
-            left,
-            top + 0.22 - 0.16 * number,
-            text,
-            fontsize=8.0 - number,
-            fontweight="normal" if number else "bold",
-        )
-        taken = written.get_window_extent().width / figure.dpi
-        if taken > room:
-            written.set_fontsize(float(written.get_fontsize()) * room / taken)
+    """Write a value above a map, and below it what the variant changes, in lines."""
+    value, changes = words
+    lines = len(changes)
+    put_text(
+        figure, left, top + 0.07 + TILE_LINE * lines, value, fontsize=8.0,
+        fontweight="bold",
+    )  # fmt: skip
+    for number, text in enumerate(changes):
+        bottom = top + 0.06 + TILE_LINE * (lines - 1 - number)
+        put_text(figure, left, bottom, text, fontsize=6.5, color=MUTED)
 
 
 def best_rows(study: Study) -> list[int]:
@@ -233,23 +237,38 @@ def best_rows(study: Study) -> list[int]:
     name, value = study.objective_names[0], study.objective[:, 0]
     sign = 1.0 if name in LOWER_IS_BETTER else -1.0
     known = np.flatnonzero((study.feasible > 0) & ~np.isnan(value))
-    ranked = known[np.argsort(sign * value[known], kind="stable")].tolist()
+    # Of equal ones the study itself has decided.
+    chosen = [known != row for row in (study.runner_up, study.best)]
+    ranked = known[np.lexsort((*chosen, sign * value[known]))].tolist()
     rows = [study.base, *(row for row in ranked if row != study.base)]
     return [row for row in rows if study.done[row]][: TILES_ACROSS * TILES_DOWN]
 
 
-def _tile_words(study: Study, row: int) -> tuple[str, str]:
-    """What a map is of: its value, and what it changes."""
+def _tile_words(study: Study, row: int) -> tuple[str, list[str]]:
+    """What a map is of: its value, and line by line what it changes."""
     name = study.objective_names[0]
-    unit = UNIT_WORDS[OBJECTIVES[name]]
     marks = [
         word
         for word, marked in (("base", study.base), ("best", study.best))
         if marked == row
     ]
-    value = f"{study.objective[row, 0]:.{1 if unit == '%' else 2}f} {unit}"
+    unit = UNIT_WORDS[OBJECTIVES[name]]
+    value = f"{study.objective[row, 0]:.{digits_of(name)}f} {unit}"
+    if name != "bin_reachability":
+        value = f"{name} {value}"
     changes = changes_text(study, row) or study.assignment[row]
-    return " · ".join([*marks, value]), changes
+    return " · ".join([*marks, value]), _in_lines(changes.split(", "))
+
+
+def _in_lines(parts: Sequence[str]) -> list[str]:
+    """One part a line, the last line cut where there are too many or it is long."""
+    kept = list(parts[:TILE_LINES])
+    if len(parts) > TILE_LINES:
+        kept[-1] += f" and {len(parts) - TILE_LINES} more"
+    return [
+        text if len(text) <= TILE_LETTERS else f"{text[: TILE_LETTERS - 1]}…"
+        for text in kept
+    ]
 
 
 def _axis_title(effect: MainEffect) -> str:

@@ -3,15 +3,22 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
-from reachmap._typing import BoolArray, FloatArray
+from reachmap._typing import BoolArray, FloatArray, IntArray
 from reachmap.maps.study.record import LOWER_IS_BETTER, OBJECTIVES, Study
-from reachmap.maps.study.words import UNIT_WORDS, changes_text
+from reachmap.maps.study.words import (
+    UNIT_WORDS,
+    changes_text,
+    digits_of,
+    value_texts,
+)
 from reachmap.plots.parts.squares import PERCENT_SCALE, colour_bar
 from reachmap.plots.parts.style import (
     BIN_COLOUR,
@@ -23,8 +30,10 @@ from reachmap.plots.parts.style import (
     axes_at,
     colour_map,
     drawing,
+    fit_width,
     ink_on,
     new_figure,
+    put_text,
     put_title,
 )
 
@@ -33,6 +42,10 @@ AXIS_IN = 1.5
 SQUARE, GAP = 0.42, 0.75
 LABEL = 12
 MOST_LABELS = 8
+# Letters of a parameter's name; by how much of the height equal lines are apart.
+NAME, ASIDE = 24, 0.025
+# Points of a front that are told, and the height of a line about one [in].
+MOST_NAMED, LINE = 8, 0.17
 
 
 def pareto_front(values: FloatArray, known: BoolArray) -> BoolArray:
@@ -80,8 +93,10 @@ def draw_pareto(study: Study, first: int, second: int) -> Figure:
     known = study.done & ~np.isnan(study.objective[:, columns]).any(axis=1)
     front = pareto_front(_oriented(study, columns), known)
     names = [study.objective_names[k] for k in columns]
-    figure = new_figure(LEFT + 4.4 + 0.35, BOTTOM + 3.6 + HEAD)
-    axes = axes_at(figure, LEFT, BOTTOM, 4.4, 3.6)
+    named = min(len(set(map(tuple, study.objective[front][:, columns]))), MOST_NAMED)
+    bottom = BOTTOM + LINE * (named + 0.3)
+    figure = new_figure(LEFT + 4.4 + 0.35, bottom + 3.6 + HEAD)
+    axes = axes_at(figure, LEFT, bottom, 4.4, 3.6)
     x, y = study.objective[:, first], study.objective[:, second]
     rest = known & ~front & (study.feasible > 0)
     unmet = known & ~front & (study.feasible == 0)
@@ -89,7 +104,9 @@ def draw_pareto(study: Study, first: int, second: int) -> Figure:
     if unmet.any():
         axes.plot(x[unmet], y[unmet], "x", color=MUTED, label="violates a requirement")
     order = np.flatnonzero(front)[np.argsort(x[front], kind="stable")]
-    axes.plot(x[order], y[order], "-o", color=BIN_COLOUR, label="Pareto front")
+    corner = "steps-post" if names[0] in LOWER_IS_BETTER else "steps-pre"
+    axes.plot(x[order], y[order], color=BIN_COLOUR, drawstyle=corner, linewidth=1.2)
+    axes.plot(x[order], y[order], "o", color=BIN_COLOUR, label="Pareto front")
     if study.base >= 0 and known[study.base]:
         axes.plot(
             [x[study.base]], [y[study.base]], "s", color=INK, fillstyle="none",
@@ -103,79 +120,137 @@ def draw_pareto(study: Study, first: int, second: int) -> Figure:
     axes.grid(color="#e4e4e4", linewidth=0.7)
     axes.set_axisbelow(True)
     axes.legend(frameon=False, fontsize=7.5)
+    _name_front(figure, axes, study, columns, order)
     said = f"{int(front.sum())} of {int(known.sum())} variants are Pareto-optimal"
     put_title(figure, LEFT, f"{names[0]} against {names[1]}", said)
     return figure
+
+
+def _name_front(
+    figure: Figure, axes: Axes, study: Study, columns: list[int], order: IntArray
+) -> None:
+    """Number the points of the front, and say below what each changes."""
+    places: dict[tuple[float, ...], list[int]] = {}
+    for row in order.tolist():
+        places.setdefault(tuple(study.objective[row, columns].tolist()), []).append(row)
+    shown = [*places.items()][:MOST_NAMED]
+    for number, (at, rows) in enumerate(shown, 1):
+        axes.annotate(
+            str(number), (at[0], at[1]), xytext=(5, 5), textcoords="offset points",
+            fontsize=7.5, color=BIN_COLOUR, fontweight="bold",
+        )  # fmt: skip
+        same = f" (and {len(rows) - 1} more)" if len(rows) > 1 else ""
+        more = len(places) - len(shown)
+        rest = f"; {more} more in the table" if more and number == len(shown) else ""
+        what = changes_text(study, rows[0]) or "the base"
+        line = put_text(
+            figure, LEFT, 0.12 + LINE * (len(shown) - number),
+            f"{number}  {what}{same}{rest}", fontsize=7.5,
+        )  # fmt: skip
+        fit_width(figure, LEFT, line)
 
 
 @drawing()
 def draw_parallel(
     study: Study, objective: int, percent_map: PercentMap = "RdYlGn"
 ) -> Figure:
-    """Every variant as a line across its parameters, coloured by an objective.
+    """Every variant as a line across its parameters, to what they come to.
+
+    Lines that would coincide lie side by side.
 
     Parameters
     ----------
     study : Study
     objective : int
+        On the last axis; it colours the lines.
     percent_map : str
     """
     name = study.objective_names[objective]
+    unit = UNIT_WORDS[OBJECTIVES[name]]
     value = study.objective[:, objective]
     known = study.done & ~np.isnan(value)
     count = len(study.parameter_names)
     width = AXIS_IN * max(count, 2)
     figure = new_figure(LEFT + width + 1.2, BOTTOM + HEIGHT + HEAD)
     axes = axes_at(figure, LEFT, BOTTOM, width, HEIGHT)
-    percent = OBJECTIVES[name] == "percent"
     scale = (
         PERCENT_SCALE
-        if percent
+        if unit == "%"
         else Normalize(float(np.nanmin(value)), float(np.nanmax(value)))
     )
-    colours = colour_map(percent_map if percent else "viridis")
-    low, high = study.parameter[known].min(axis=0), study.parameter[known].max(axis=0)
-    span = np.where(high > low, high - low, 1.0)
+    colours = colour_map(percent_map if unit == "%" else "viridis")
+    table = np.column_stack([study.parameter, value])
+    low, high = table[known].min(axis=0), table[known].max(axis=0)
+    height = np.where(
+        high > low, (table - low) / np.where(high > low, high - low, 1), 0.5
+    )
     better = -1.0 if name in LOWER_IS_BETTER else 1.0
-    # The best on top.
-    for row in np.flatnonzero(known)[np.argsort(better * value[known], kind="stable")]:
-        heights = (study.parameter[row] - low) / span
+    order = np.flatnonzero(known)[np.argsort(better * value[known], kind="stable")]
+    aside = np.linspace(-ASIDE, ASIDE, len(order)) if len(order) > 1 else [0.0]
+    for row, shift in zip(order.tolist(), aside, strict=True):
         best = row == study.best
         axes.plot(
-            range(count),
-            heights,
+            range(count + 1),
+            height[row] + np.append(np.full(count, shift), 0.0),
             "-o",
             color=INK if best else colours(scale(value[row])),
             linewidth=2.6 if best else 1.2,
-            markersize=4,
+            markersize=3,
+            zorder=4 if best else 2,
         )
-    for k in range(count):
-        axes.axvline(k, color=PALE, zorder=0)
-        for end, at in ((low[k], 0.0), (high[k], 1.0)):
-            axes.annotate(
-                f"{end:g}", (k, at), xytext=(4, -9 if at == 0 else 5),
-                textcoords="offset points", fontsize=7.0, color=MUTED,
-            )  # fmt: skip
+    _label_axes(axes, study, order, height)
+    ends = [f"{end:.{digits_of(name)}f} {unit}" for end in (low[-1], high[-1])]
+    for text, at in zip(
+        ends, (0.0, 1.0) if high[-1] > low[-1] else (0.5,), strict=False
+    ):
+        _write_beside(axes, count, at, text)
     axes.set_xticks(
-        range(count), [n[-24:] for n in study.parameter_names], fontsize=7.5
+        range(count + 1),
+        [*(n[-NAME:] for n in study.parameter_names), name],
+        fontsize=7.5,
     )
     axes.set_yticks([])
+    axes.set_xlim(-0.15, count + 0.15)
     axes.set_ylim(-0.12, 1.12)
     for spine in axes.spines.values():
         spine.set_visible(False)
     mesh = ScalarMappable(norm=scale, cmap=colours)
-    unit = UNIT_WORDS[OBJECTIVES[name]]
     colour_bar(
-        figure, mesh, (LEFT + width + 0.15, BOTTOM, 0.14, HEIGHT),
-        f"{name} [{unit}]", step=20.0 if percent else None,
+        figure, mesh, (LEFT + width + 0.35, BOTTOM, 0.14, HEIGHT),
+        f"{name} [{unit}]", step=20.0 if unit == "%" else None,
     )  # fmt: skip
     said = (
-        "dark: the best, " + (changes_text(study, study.best) or "the base")
+        "dark: the best, " + (changes_text(study, study.best) or "which is the base")
         if study.best >= 0
         else "no variant meets the requirements"
     )
     put_title(figure, LEFT, f"{int(known.sum())} variants, {name}", said)
     return figure
+
+
+def _label_axes(
+    axes: Axes, study: Study, rows: Sequence[int] | IntArray, height: FloatArray
+) -> None:
+    """Draw an axis for each parameter and write its values, or the ends of many."""
+    for k in range(height.shape[1]):
+        axes.axvline(k, color=PALE, zorder=0)
+    for k in range(len(study.parameter_names)):
+        places = {
+            round(float(height[row, k]), 9): value_texts(study, row)[k] for row in rows
+        }
+        shown = sorted(places)
+        if len(shown) > MOST_LABELS:
+            shown = [shown[0], shown[-1]]
+        for at in shown:
+            _write_beside(axes, k, at, places[at][:LABEL])
+
+
+def _write_beside(axes: Axes, k: int, at: float, text: str) -> None:
+    axes.annotate(
+        text, (k, at), xytext=(5, 5), textcoords="offset points", fontsize=7.0,
+        color=INK, zorder=6,
+        bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 0.6},
+    )  # fmt: skip
 
 
 @drawing()
@@ -222,8 +297,10 @@ def draw_interactions(
                 )  # fmt: skip
         for axis, k in ((axes.xaxis, a), (axes.yaxis, b)):
             values = np.unique(study.parameter[known, k])
-            axis.set_ticks(np.arange(len(values)) + 0.5, [f"{v:g}" for v in values])
-            axis.set_label_text(study.parameter_names[k][-24:], fontsize=7.5)
+            rows = [int((study.parameter[:, k] == v).argmax()) for v in values]
+            texts = [value_texts(study, row)[k][:LABEL] for row in rows]
+            axis.set_ticks(np.arange(len(values)) + 0.5, texts)
+            axis.set_label_text(axis_title(study, k), fontsize=7.5)
             axis.set_tick_params(length=0, labelsize=6.5)
         left += width
     colour_bar(
@@ -237,6 +314,12 @@ def draw_interactions(
         "means over all other parameters",
     )
     return figure
+
+
+def axis_title(study: Study, k: int) -> str:
+    """Name of a parameter, its end if it is long, with its unit."""
+    name, unit = study.parameter_names[k][-NAME:], study.parameter_units[k]
+    return name if unit in ("", "choice") else f"{name} [{unit}]"
 
 
 def _pair_table(

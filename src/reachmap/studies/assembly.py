@@ -77,8 +77,8 @@ def assemble(
             for row in values["value"].tolist()
         ]
     )
-    sign = 1.0 if names[0] in LOWER_IS_BETTER else -1.0
-    costs = np.where(feasible, sign * values["value"][:, 0], np.nan)
+    signs = [1.0 if name in LOWER_IS_BETTER else -1.0 for name in names]
+    costs = np.where(feasible[:, None], signs * values["value"], np.nan)
     best, runner_up = best_rows(costs, document["base"])
     return Study(
         design=document["design"],
@@ -199,12 +199,20 @@ def _changes(
 
 
 def best_rows(costs: FloatArray, base: int) -> tuple[int, int]:
-    """The cheapest variant and the one after it, -1 for none; NaN cannot be chosen.
+    """The cheapest variant and the one after it, -1 for none.
 
-    Of equal ones the base comes first: what gains nothing is no reason to change.
+    Of those that are equal by the first cost the base comes first: what gains nothing
+    is no reason to change. Of others the next cost decides.
+
+    Parameters
+    ----------
+    costs : array, shape (variants, objectives)
+        Variants whose first cost is NaN cannot be chosen.
+    base : int
     """
-    rows = np.flatnonzero(~np.isnan(costs))
-    order = rows[np.lexsort((rows, rows != base, costs[rows]))]
+    rows = np.flatnonzero(~np.isnan(costs[:, 0]))
+    first, *others = costs[rows].T
+    order = rows[np.lexsort((rows, *reversed(others), rows != base, first))]
     best, runner_up = [*order.tolist(), -1, -1][:2]
     return best, runner_up
 

@@ -26,13 +26,13 @@ OBJECTIVES: dict[str, str] = {
 }
 """Name of an objective to its unit."""
 ALWAYS = (
-    "level_average",
     "bin_reachability",
     "directions",
     "points",
     PATH_LENGTH,
+    "level_average",
 )
-"""Objectives that every cell has."""
+"""Objectives that every cell has; by default the first one decides."""
 MEANS = frozenset({PATH_LENGTH, "motion_time_s", "emptied", "cycle_time_s"})
 """Objectives that are means of numbers; the others are shares of what is reached."""
 LOWER_IS_BETTER = frozenset({PATH_LENGTH, "motion_time_s", "cycle_time_s"})

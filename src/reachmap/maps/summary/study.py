@@ -95,14 +95,15 @@ class StudySummary:
     def sentences(self) -> list[str]:
         """All changes from the base: the best variant's, then those of one parameter.
 
-        The others follow, those of few parameters first.
+        Those of more parameters follow; among equals, those of the first objective
+        come first.
         """
         found = [
-            (variant.variant != self.best, text.count(" → "), text)
+            (variant.variant != self.best, text.count(" → "), objective, text)
             for variant in self.variants
-            for text in variant.sentences.values()
+            for objective, text in enumerate(variant.sentences.values())
         ]
-        return [text for *_, text in sorted(found, key=lambda item: item[:2])]
+        return [text for *_, text in sorted(found, key=lambda item: item[:3])]
 
     def role(self, variant: VariantSummary) -> str:
         """What a variant is in the study: base, best, failed; "" for nothing."""
