@@ -180,15 +180,18 @@ def read_text(path: Path, *, limit: int) -> str:
 
 def read_bytes(path: Path, *, limit: int) -> bytes:
     """Read a regular file of bounded size; CellError names the file."""
+    data = problem = None
     try:
-        if not path.is_file():
-            reason = "is a folder" if path.is_dir() else "no such file"
-            raise CellError(f"{path}: {reason}")
-        with path.open("rb") as stream:
-            data = stream.read(limit + 1)
+        if path.is_file():
+            with path.open("rb") as stream:
+                data = stream.read(limit + 1)
+        else:
+            problem = "is a folder" if path.is_dir() else "no such file"
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
-        raise CellError(f"{path}: cannot be read ({reason})") from None
+        problem = f"cannot be read ({reason})"
+    if data is None:
+        raise CellError(f"{path}: {problem}")
     if len(data) > limit:
         raise CellError(f"{path}: larger than the limit of {limit:,} bytes")
     return data
