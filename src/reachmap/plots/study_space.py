@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -179,31 +180,7 @@ def draw_parallel(
         else Normalize(float(np.nanmin(value)), float(np.nanmax(value)))
     )
     colours = colour_map(percent_map if unit == "%" else "viridis")
-    table = np.column_stack([study.parameter, value])
-    low, high = table[known].min(axis=0), table[known].max(axis=0)
-    height = np.where(
-        high > low, (table - low) / np.where(high > low, high - low, 1), 0.5
-    )
-    better = -1.0 if name in LOWER_IS_BETTER else 1.0
-    order = np.flatnonzero(known)[np.argsort(better * value[known], kind="stable")]
-    aside = np.linspace(-ASIDE, ASIDE, len(order)) if len(order) > 1 else [0.0]
-    for row, shift in zip(order.tolist(), aside, strict=True):
-        best = row == study.best
-        axes.plot(
-            range(count + 1),
-            height[row] + np.append(np.full(count, shift), 0.0),
-            "-o",
-            color=INK if best else colours(scale(value[row])),
-            linewidth=2.6 if best else 1.2,
-            markersize=3,
-            zorder=4 if best else 2,
-        )
-    _label_axes(axes, study, order, height)
-    ends = [f"{end:.{digits_of(name)}f} {unit}" for end in (low[-1], high[-1])]
-    for text, at in zip(
-        ends, (0.0, 1.0) if high[-1] > low[-1] else (0.5,), strict=False
-    ):
-        _write_beside(axes, count, at, text)
+    _draw_lines(axes, study, objective, [colours(scale(one)) for one in value])
     axes.set_xticks(
         range(count + 1),
         [*(n[-NAME:] for n in study.parameter_names), name],
@@ -226,6 +203,39 @@ def draw_parallel(
     )
     put_title(figure, LEFT, f"{int(known.sum())} variants, {name}", said)
     return figure
+
+
+def _draw_lines(
+    axes: Axes, study: Study, objective: int, colours: Sequence[Any]
+) -> None:
+    """Draw the lines of :func:`draw_parallel`, the best variant's last."""
+    name, value = study.objective_names[objective], study.objective[:, objective]
+    known = study.done & ~np.isnan(value)
+    count = len(study.parameter_names)
+    table = np.column_stack([study.parameter, value])
+    low, high = table[known].min(axis=0), table[known].max(axis=0)
+    span = np.where(high > low, high - low, 1.0)
+    height = np.where(high > low, (table - low) / span, 0.5)
+    better = -1.0 if name in LOWER_IS_BETTER else 1.0
+    order = np.flatnonzero(known)[np.argsort(better * value[known], kind="stable")]
+    aside = np.linspace(-ASIDE, ASIDE, len(order)) if len(order) > 1 else [0.0]
+    for row, shift in zip(order.tolist(), aside, strict=True):
+        best = row == study.best
+        axes.plot(
+            range(count + 1),
+            height[row] + np.append(np.full(count, shift), 0.0),
+            "-o",
+            color=INK if best else colours[row],
+            linewidth=2.6 if best else 1.2,
+            markersize=3,
+            zorder=4 if best else 2,
+        )
+    _label_axes(axes, study, order, height)
+    unit, digits = UNIT_WORDS[OBJECTIVES[name]], digits_of(name)
+    for at, end in {
+        float(height[row, -1]): value[row] for row in order[[0, -1]]
+    }.items():
+        _write_beside(axes, count, at, f"{end:.{digits}f} {unit}")
 
 
 def _label_axes(
