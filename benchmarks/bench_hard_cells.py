@@ -14,9 +14,9 @@ default those of benchmarks/hard_cells):
   network three times as large, shortened further, with another seed;
 - how well a map of the cell, whose cup is round, predicts random grasps of another
   seed, planned to over roadmaps of their own: precision and recall of *reachable*, rank
-  correlation of predicted and measured J, by the nearest test grasp and blended over
-  four test points, and of two halves of the measurement, and the share of the variance
-  of an attempt that is the grasp and not luck.
+  correlation of predicted and measured J, by the nearest test grasp and the median
+  over eight test points, and of two halves of the measurement, and the share of the
+  variance of an attempt that is the grasp and not luck.
 
 ``--verdicts`` leaves out all but the first, ``--predictions`` all but the last.
 """
@@ -57,7 +57,7 @@ REPEATS = 5
 # Maps of predictions, and the random grasps that they are judged by.
 MAPPED = ("tool.roll=free", "bin_scan.repeats=2")
 RANDOM, RANDOM_SEED, RANDOM_REPEATS = 200, 77, 4
-NEIGHBOURS = 4
+NEIGHBOURS = 8
 
 
 def survey_of(scene: Scene) -> Survey:
@@ -204,15 +204,15 @@ def predictions(cell: Path) -> None:
         scan_s = time.process_time() - begin
         pick = PickOptions(repeats=RANDOM_REPEATS, seed=RANDOM_SEED)
         found = validate(path, random=RANDOM, pick=pick, run=quiet).validation
-        blended = blended_correlation(path, found.lists[0])
+        median = median_correlation(path, found.lists[0])
     one, shares = found.overall, found.reliability
     verdict = one.confusion
     print(
         f"  predicted (scan {scan_s:.0f} s of CPU), {one.grasps} random grasps: "
         f"precision {100 * verdict.precision.share:.1f} % of {verdict.precision.total},"
         f" recall {100 * verdict.recall.share:.1f} % of {verdict.recall.total}; "
-        f"Spearman of J {one.correlation.spearman:.2f}, blended over {NEIGHBOURS} "
-        f"points {blended:.2f}, of the measurement with itself "
+        f"Spearman of J {one.correlation.spearman:.2f}, median over {NEIGHBOURS} "
+        f"points {median:.2f}, of the measurement with itself "
         f"{one.repeatability.spearman:.2f}; reliability of an attempt's length "
         f"{shares['path_length'].share:.2f}, execution time "
         f"{shares['execution_time'].share:.2f}",
@@ -220,8 +220,8 @@ def predictions(cell: Path) -> None:
     )
 
 
-def blended_correlation(path: Path, judged: JudgedList) -> float:
-    """Spearman's ρ of measured J and J blended over the nearest test points."""
+def median_correlation(path: Path, judged: JudgedList) -> float:
+    """Spearman's ρ of measured J and median J over the nearest test points."""
     bin_map = read_bin_map(path)
     ranker = Ranker(bin_map)
     ranked = rank_list(random_grasps(bin_map, RANDOM, RANDOM_SEED), ranker)

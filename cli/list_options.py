@@ -122,7 +122,8 @@ list_options = compose(
         type=click.IntRange(1, 64),
         default=1,
         show_default=True,
-        help="Blend the costs of like orientations at the N nearest test points.",
+        help="Take the median cost of like orientations at the N nearest test "
+        "points, near ones counting more; 1 is the nearest alone, as in the paper.",
     ),
     click.option(
         "--roll",

@@ -215,40 +215,37 @@ def test_likeness_of_full_orientations_uses_their_own_spacing():
     assert RANKER.table.spacing_rad[1] == pytest.approx(max(gaps))
 
 
-def test_neighbours_are_blended_by_inverse_distance():
-    """The blend of two points is the weighted mean of their own terms."""
+def test_neighbours_give_the_median_weighted_by_inverse_distance():
+    """Of two points that is the nearer."""
     m = all_reachable()
     ranker = Ranker(m)
     a, b = m.position[0, 1, 1], m.position[0, 1, 2]
-    point = 0.75 * a + 0.25 * b
-    down = np.array([[0.0, 0.0, -1.0]])
-    blended = ranker.rank(point[None], down, neighbours=2)
-    terms = [ranker.rank(p[None], down).terms[0, :3] for p in (a, b)]
-    expected = 0.75 * terms[0] + 0.25 * terms[1]
-    # Orientations a step away count a few millionths.
-    np.testing.assert_allclose(blended.terms[0, :3], expected, rtol=1e-3)
-    on_point = ranker.rank(a[None], down, neighbours=5)
-    np.testing.assert_allclose(on_point.terms[0, :3], terms[0], rtol=1e-4)
+    R = rotation_from_quaternion_wxyz(m.quaternion_wxyz[0, 1, 1, 0])[None]
+    nearer = ranker.rank((0.75 * a + 0.25 * b)[None], rotations=R, neighbours=2)
+    terms = [ranker.rank(p[None], rotations=R).terms[0, :3] for p in (a, b)]
+    np.testing.assert_array_equal(nearer.terms[0, :3], terms[0])
+    on_point = ranker.rank(a[None], rotations=R, neighbours=5)
+    np.testing.assert_array_equal(on_point.terms[0, :3], terms[0])
 
 
-def test_an_unreachable_neighbour_has_no_cost_to_blend():
-    """What is left is blended, and the nearest test grasp still decides."""
+def test_an_unreachable_neighbour_has_no_cost():
+    """The median is of what is left, and the nearest test grasp still decides."""
     m = all_reachable()
     found, status = m.path_found.copy(), m.status.copy()
     found[0, 1, 2], status[0, 1, 2] = 0, Status.NO_IK
     lost = Ranker(dataclasses.replace(m, path_found=found, status=status))
     a, b = m.position[0, 1, 1], m.position[0, 1, 2]
-    down = np.array([[0.0, 0.0, -1.0]])
-    blended = lost.rank((0.7 * a + 0.3 * b)[None], down, neighbours=2)
-    alone = lost.rank(a[None], down)
-    np.testing.assert_allclose(blended.terms[0, :3], alone.terms[0, :3], rtol=1e-3)
-    near_lost = lost.rank((0.3 * a + 0.7 * b)[None], down, neighbours=4)
+    R = rotation_from_quaternion_wxyz(m.quaternion_wxyz[0, 1, 1, 0])[None]
+    median = lost.rank((0.6 * a + 0.4 * b)[None], rotations=R, neighbours=2)
+    alone = lost.rank(a[None], rotations=R)
+    np.testing.assert_array_equal(median.terms[0, :3], alone.terms[0, :3])
+    near_lost = lost.rank((0.3 * a + 0.7 * b)[None], rotations=R, neighbours=4)
     assert not near_lost.reachable[0]
 
 
 @pytest.mark.parametrize("free", [True, False])
 @pytest.mark.parametrize("same_everywhere", [True, False])
-def test_blended_costs_are_those_of_a_plain_loop(free, same_everywhere):
+def test_median_costs_are_those_of_a_plain_loop(free, same_everywhere):
     """Over nearest points and, by a kernel, over like directions or orientations."""
     bin_map = make_bin_map(seed=3, reachable=0.8)
     if not same_everywhere:
@@ -258,56 +255,54 @@ def test_blended_costs_are_those_of_a_plain_loop(free, same_everywhere):
     ranker = Ranker(bin_map)
     table, rng = ranker.table, np.random.default_rng(0)
     assert table.same_everywhere == same_everywhere
-    points = table.points[rng.integers(len(table.points), size=20)]
+    points = table.points[rng.integers(len(table.points), size=30)]
     points = points + rng.uniform(-0.01, 0.01, points.shape)
-    R = Rotation.from_euler("xyz", rng.normal(0, 0.2, (20, 3))).as_matrix()
-    down = table.axes[0, 0] @ np.eye(3)
-    R = R @ rotation_between(axis_vector(bin_map.approach_axis), down)
+    R = Rotation.from_euler("xyz", rng.normal(0, 0.2, (30, 3))).as_matrix()
+    axis = axis_vector(bin_map.approach_axis)
+    R = R @ rotation_between(axis, table.axes[0, 0])
     roll: Roll = "free" if free else "fixed"
-    blended = ranker.rank(points, rotations=R, neighbours=3, roll=roll)
+    median = ranker.rank(points, rotations=R, neighbours=3, roll=roll)
     nearest = ranker.rank(points, rotations=R, roll=roll)
-    np.testing.assert_array_equal(blended.reachable, nearest.reachable)
-    assert blended.reachable.sum() >= 5
-    axes = R @ axis_vector(bin_map.approach_axis)
-    spacing = table.spacing_rad[0 if free else 1]
-    for n in np.flatnonzero(blended.reachable):
-        distance = np.linalg.norm(table.points - points[n], axis=1)
-        total, blend = 0.0, np.zeros(3)
-        for p in np.argsort(distance)[:3]:
-            angle, terms = [], []
-            for o in range(table.axes.shape[1]):
-                stored = rotation_from_quaternion_wxyz(table.quaternions[p, o])
-                turn = rotation_angle(R[n], stored)
-                angle.append(
-                    float(direction_angle(axes[n], table.axes[p, o]) if free else turn)
-                )
-                terms.append(table.normalised[p, o])
-            if free and same_everywhere:
-                # Of the rolls of one direction the cheapest.
-                order = sorted(
-                    range(len(terms)), key=lambda o: np.nan_to_num(sum(terms[o]), nan=9)
-                )
-                kept: list[int] = []
-                for o in order:
-                    alike = direction_angle(table.axes[p, o], table.axes[p, kept])
-                    if not kept or alike.min() > 1e-6:
-                        kept.append(o)
-                angle, terms = [angle[o] for o in kept], [terms[o] for o in kept]
-            for a, values in zip(angle, terms, strict=True):
-                like = np.cos(a) - np.cos(min(angle))
-                weight = np.exp(like / (0.2 * spacing) ** 2) / distance[p]
-                if np.isfinite(values).all():
-                    total, blend = total + weight, blend + weight * values
-        np.testing.assert_allclose(blended.terms[n, :3], blend / total, rtol=1e-6)
+    np.testing.assert_array_equal(median.reachable, nearest.reachable)
+    assert (median.cost != nearest.cost).sum() >= 3
+    for n in np.flatnonzero(median.reachable):
+        expected = plain_median(table, points[n], R[n], R[n] @ axis if free else None)
+        np.testing.assert_allclose(median.terms[n, :3], expected, rtol=1e-12)
+
+
+def plain_median(table, point, R, axis):
+    """Terms of median cost over the three nearest points, one by one."""
+    distance = np.linalg.norm(table.points - point, axis=1)
+    spacing = table.spacing_rad[1 if axis is None else 0]
+    rows = []
+    for p in np.argsort(distance)[:3]:
+        angle = [
+            rotation_angle(R, rotation_from_quaternion_wxyz(table.quaternions[p, o]))
+            if axis is None
+            else direction_angle(axis, table.axes[p, o])
+            for o in range(table.axes.shape[1])
+        ]
+        for o, a in enumerate(angle):
+            terms = table.normalised[p, o]
+            like = np.exp((np.cos(a) - np.cos(min(angle))) / (0.3 * spacing) ** 2)
+            if np.isfinite(terms).all():
+                rows.append((terms.sum(), like / distance[p], terms))
+    rows.sort(key=lambda row: row[0])
+    half, total = 0.5 * sum(row[1] for row in rows), 0.0
+    for _, weight, terms in rows:
+        total += weight
+        if total >= half:
+            return terms
+    raise AssertionError
 
 
 def test_more_neighbours_than_points():
     """A map of one point answers for any number of neighbours."""
     ranker = Ranker(make_bin_map(shape=(1, 1, 1), reachable=1.0))
     point = ranker.table.points[:1]
-    down = np.array([[0.0, 0.0, -1.0]])
-    one, many = (ranker.rank(point, down, neighbours=k) for k in (1, 64))
-    np.testing.assert_allclose(one.cost, many.cost, rtol=1e-4)
+    R = rotation_from_quaternion_wxyz(ranker.table.quaternions[0, 0])[None]
+    one, many = (ranker.rank(point, rotations=R, neighbours=k) for k in (1, 64))
+    np.testing.assert_allclose(one.cost, many.cost)
 
 
 def test_outside_the_map_sideways_above_and_below():

@@ -1,4 +1,4 @@
-"""The cost of grasps: the requested terms, one column each, their blending, likeness.
+"""The cost of grasps: the requested terms, their median over neighbours, likeness.
 
 J = α φ3 + β φ4 + δ φ5 + ε φ6, with φ3, φ4, φ5 the mean path length, planning time and
 execution time of the test grasp, each divided by a high quantile (or the maximum) over
@@ -16,7 +16,6 @@ from reachmap._typing import BoolArray, FloatArray, IntArray
 from reachmap.errors import SettingsError
 from reachmap.ranking.lookup.matching import Matches, NearestPoints, Queries
 from reachmap.ranking.lookup.settings import ALIKE_STEPS, MARGINS, RankSettings
-from reachmap.ranking.lookup.surroundings import directions_of, turn_cosines
 from reachmap.ranking.lookup.table import TERMS, GraspTable
 from reachmap.ranking.terms import PLANNING, CycleSeconds
 
@@ -112,10 +111,12 @@ SIDEWAYS_TOLERANCE_M: Final = 1e-3
 VERTICAL_TOLERANCE_M: Final = 0.05
 BOTTOM_TOLERANCE_M: Final = 5e-3
 MIN_DISTANCE_M: Final = 1e-6
-# Width of the kernel of blended costs in spacings of the orientations. Chosen on the
-# machine door of benchmarks/hard_cells, whose costs turn with the direction: wider
-# ones mix ways that the arm takes differently (docs/explanation/prediction.md).
-BLEND_STEPS: Final = 0.2
+# Width of the kernel of likeness in spacings of the orientations. Chosen on maps of the
+# machine door and the two bins of benchmarks/hard_cells, where 0.2 to 0.4 hardly differ
+# (docs/explanation/prediction.md).
+MEDIAN_STEPS: Final = 0.3
+# Grasps that are compared with all their neighbours at once: some 100 MB.
+ROWS_AT_ONCE: Final = 2000
 
 
 def outside_map(points: FloatArray, nearest: IntArray, table: GraspTable) -> BoolArray:
@@ -178,7 +179,7 @@ def likeness_terms(matches: Matches, free: BoolArray, table: GraspTable) -> Floa
     return np.asarray(0.5 * (matches.distance / h + matches.angle / spacing))
 
 
-def blended_terms(
+def median_terms(
     phi: FloatArray,
     queries: Queries,
     table: GraspTable,
@@ -186,12 +187,13 @@ def blended_terms(
     columns: Columns,
     neighbours: int,
 ) -> FloatArray:
-    """Terms blended over the reachable test grasps around each grasp.
+    """Terms of the test grasp of median cost among the reachable ones around a grasp.
 
     Those of the k nearest test points count by the inverse of their distance, and at
-    each point those of like orientation by a von Mises-Fisher kernel. Whether a grasp
-    is reachable is still decided by its nearest test grasp alone, and how likely by
-    its surroundings: what is unreachable has no cost to blend.
+    each point those of like orientation by a von Mises-Fisher kernel. A median rather
+    than a mean, since an arm reaches neighbours by ways of very different length, and
+    a way between two of them is none. Whether a grasp is reachable is still decided by
+    its nearest test grasp alone.
 
     Parameters
     ----------
@@ -207,57 +209,52 @@ def blended_terms(
     array, shape (n, k)
         NaN where the nearest test grasp is unreachable.
     """
-    blended = phi.copy()
+    terms, cost = phi.copy(), columns.costs()
     for free in (True, False):
         rows = np.flatnonzero((queries.free == free) & ~np.isnan(phi[:, 0]))
-        if rows.size:
-            some = queries.take(rows)
-            around = tree.in_order(some.points, neighbours)
-            terms = _blend(some, table, columns, *around, free=free)
-            known = ~np.isnan(terms[:, 0])
-            blended[rows[known]] = terms[known]
-    return blended
+        if not rows.size:
+            continue
+        for part in np.array_split(rows, -(-len(rows) // ROWS_AT_ONCE)):
+            some = queries.take(part)
+            distance, point = tree.in_order(some.points, neighbours)
+            weight = _likeness(some, table, point, free=free)
+            weight /= np.maximum(distance, MIN_DISTANCE_M)[..., None]
+            row, middle = _weighted_median(
+                cost[point].reshape(len(part), -1), weight.reshape(len(part), -1)
+            )
+            near, orientation = np.divmod(middle, cost.shape[1])
+            terms[part[row]] = columns.values[point[row, near], orientation]
+    return terms
 
 
-def _blend(
+def _likeness(
     queries: Queries,
     table: GraspTable,
-    columns: Columns,
-    distance: FloatArray,
     point: IntArray,
     *,
     free: bool,
 ) -> FloatArray:
-    """Blended terms of grasps whose roll is all free or all fixed; NaN: none around."""
-    vectors = queries.axes if free else queries.quaternions
+    """Kernel of φ2, 1 for the most alike at each point (n, k); shape (n, k, m)."""
     stored = table.axes if free else table.quaternions
-    stored, values = stored[:1] if table.same_everywhere else stored, columns.values
-    if free and table.same_everywhere:
-        stored, values = _by_direction(stored, columns)
-    width = BLEND_STEPS * float(table.spacing_rad[0 if free else 1])
-    total = np.zeros((len(queries), 1))
-    blend = np.zeros((len(queries), values.shape[-1]))
-    for at, far in zip(point.T, distance.T, strict=True):
-        cosine = turn_cosines(vectors, stored, at, free=free)
-        like = np.exp((cosine - cosine.max(axis=1, keepdims=True)) / width**2)
-        reached = ~np.isnan(values[at, :, 0])
-        weight = like * reached / np.maximum(far, MIN_DISTANCE_M)[:, None]
-        total += weight.sum(axis=1, keepdims=True)
-        blend += np.einsum("ng,ngk->nk", weight, np.nan_to_num(values[at]))
-    return np.asarray(
-        np.where(total > 0, blend / np.where(total > 0, total, 1), np.nan)
-    )
+    vectors = queries.axes if free else queries.quaternions
+    cosine = np.einsum("nk,npmk->npm", vectors, stored[point])
+    if not free:
+        # Between quaternions the product is the cosine of half the angle.
+        cosine = 2.0 * cosine**2 - 1.0
+    width = MEDIAN_STEPS * float(table.spacing_rad[0 if free else 1])
+    return np.asarray(np.exp((cosine - cosine.max(axis=-1, keepdims=True)) / width**2))
 
 
-def _by_direction(axes: FloatArray, columns: Columns) -> tuple[FloatArray, FloatArray]:
-    """Directions (1, g, 3), and terms of the cheapest roll of each (points, g, k)."""
-    first, group = directions_of(axes[0])
-    cost = columns.costs()
-    best = np.stack(
-        [
-            rolls[np.argmin(cost[:, rolls], axis=1)]
-            for rolls in (np.flatnonzero(group == g) for g in range(len(first)))
-        ],
-        axis=1,
-    )
-    return axes[:, first], np.take_along_axis(columns.values, best[..., None], axis=1)
+def _weighted_median(cost: FloatArray, weight: FloatArray) -> tuple[IntArray, IntArray]:
+    """Rows (m,) with finite costs, and the column of their weighted median (m,).
+
+    Parameters
+    ----------
+    cost, weight : array, shape (n, k)
+    """
+    weight = np.where(np.isfinite(cost), weight, 0.0)
+    known = np.flatnonzero(weight.sum(axis=1) > 0)
+    order = np.argsort(cost[known], axis=1, kind="stable")
+    sums = np.cumsum(np.take_along_axis(weight[known], order, axis=1), axis=1)
+    middle = np.argmax(sums >= 0.5 * sums[:, -1:], axis=1)
+    return known, order[np.arange(len(known)), middle]

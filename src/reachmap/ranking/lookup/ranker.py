@@ -21,10 +21,10 @@ from reachmap.ranking.lookup.costs import (
     LIKENESS,
     Columns,
     beyond_points,
-    blended_terms,
     columns_of,
     cycle_of,
     likeness_terms,
+    median_terms,
     outside_map,
     unlike_map,
 )
@@ -184,7 +184,7 @@ class Ranker:
             Weights of ``clearance``, ``joint_margin``, ``singularity`` and
             ``wind_up``; those left out weigh 0.
         neighbours : int
-            Test points whose costs are blended.
+            Test points of which the median cost is taken.
         roll : {"as-given", "free", "fixed"}
             Whether the roll about the approach counts; see :class:`RankSettings`.
         max_angle_deg : float, optional
@@ -344,7 +344,7 @@ class Ranker:
         table = self.table
         phi = columns.values[matches.point, matches.orientation]
         if settings.neighbours > 1:
-            phi = blended_terms(
+            phi = median_terms(
                 phi, queries, table, self._tree, columns, settings.neighbours
             )
         unlike = settings.likeness * likeness_terms(matches, queries.free, table)

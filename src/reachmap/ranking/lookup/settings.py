@@ -82,7 +82,7 @@ class RankSettings:
     margins : mapping
         Weights μ of the terms in ``MARGINS``, by name; those left out weigh 0.
     neighbours : int
-        Test points whose costs are blended; 1 is the paper's nearest.
+        Test points of which the median cost is taken; 1 is the paper's nearest.
     roll : {"as-given", "free", "fixed"}
         Whether the roll about the approach counts. As given: it does for grasps
         with a full orientation and not for those with a direction.

@@ -39,7 +39,7 @@ class Surroundings:
         reached = table.reachable.astype(float)
         axes, any_roll = table.axes, reached
         if table.same_everywhere:
-            first, group = directions_of(table.axes[0])
+            first, group = _directions(table.axes[0])
             axes = table.axes[:1, first]
             any_roll = np.zeros((len(reached), len(first)))
             np.maximum.at(any_roll.T, group, reached.T)
@@ -79,7 +79,7 @@ class Surroundings:
         kernel: FloatArray | None = None
         for corner, weight in zip(corners, weights, strict=True):
             if kernel is None or len(stored) > 1:
-                cosine = turn_cosines(vectors, stored, corner, free=free)
+                cosine = _cosines(vectors, stored, corner, free=free)
                 best = cosine.max(axis=1)
                 kernel = np.exp(
                     (cosine - best[:, None]) / (KERNEL_STEPS * spacing) ** 2
@@ -123,14 +123,14 @@ class Surroundings:
         return corners, weights, far
 
 
-def directions_of(axes: FloatArray) -> tuple[IntArray, IntArray]:
+def _directions(axes: FloatArray) -> tuple[IntArray, IntArray]:
     """First orientation of each approach direction, and the direction of each."""
     same: BoolArray = direction_angle(axes[:, None], axes[None]) < SAME_AXIS_RAD
     first, group = np.unique(np.argmax(same, axis=1), return_inverse=True)
     return first, group
 
 
-def turn_cosines(
+def _cosines(
     vectors: FloatArray, stored: FloatArray, point: IntArray, *, free: bool
 ) -> FloatArray:
     """Cosine of φ2 to every orientation of one point each, shape (n, g)."""
