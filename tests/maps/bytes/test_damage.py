@@ -237,6 +237,18 @@ def test_a_file_open_for_writing_is_called_that(tmp_path: Path) -> None:
     assert read_placement(path).chosen == 0
 
 
+def test_a_new_file_open_for_writing_is_called_that(tmp_path: Path) -> None:
+    """Its superblock does not say so, but its lock does."""
+    path = tmp_path / "p.h5"
+    with h5py.File(path, "w") as file:
+        file["layer"] = [0.1, 0.2]
+        file.flush()
+        with pytest.raises(MapFileError, match="open for writing in another program"):
+            read_placement(path)
+    with pytest.raises(MapFileError, match="an HDF5 file with no format"):
+        read_placement(path)
+
+
 @pytest.mark.parametrize("where", ["attribute", "attribute name", "group", "text"])
 def test_bytes_that_are_not_utf_8_are_damage(tmp_path: Path, where: str) -> None:
     """Wherever HDF5 keeps text; with a fitting seal or without one."""

@@ -10,6 +10,7 @@ Linux), an image without a seal is first tried out in a new process, which takes
 from __future__ import annotations
 
 import faulthandler
+import fcntl
 import os
 import pickle
 import resource
@@ -21,6 +22,7 @@ import warnings
 from array import array
 from collections.abc import Callable
 from contextlib import suppress
+from pathlib import Path
 from typing import Any, NoReturn, TypeVar
 
 from reachmap.maps.bytes.hdf5 import (
@@ -59,15 +61,23 @@ def named_size(image: bytes) -> int | None:
     return int.from_bytes(image[start : start + 8], "little") if start else None
 
 
-def is_open_for_writing(image: bytes) -> bool:
-    """Whether the superblock says that a program has the file open for writing.
+def is_open_for_writing(path: Path, image: bytes) -> bool:
+    """Whether a program has the file open for writing, by its superblock or its lock.
 
-    A program that crashed leaves the flag behind.
+    A program that crashed leaves a flag behind in the superblock. A file that is new
+    has none, but the HDF5 library locks what it writes.
     """
-    if len(image) < 24:
-        return False
     # Place of the consistency flags, by version of the superblock; bit 0 is writing.
-    return bool(image[11 if image[8] >= 2 else 20] & 1)
+    if len(image) >= 24 and image[11 if image[8] >= 2 else 20] & 1:
+        return True
+    try:
+        with path.open("rb") as stream:
+            fcntl.flock(stream, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    except OSError:
+        return False
+    return False
 
 
 def isolated(

@@ -143,12 +143,14 @@ def load(path: Path, *layouts: Layout) -> tuple[Tree, Layout]:
         identity, tree = isolated(_read, image, trusted=intact)
     except StructureError as error:
         raise _damaged(path, image, str(error), layouts) from error
+    if "format" not in identity and is_open_for_writing(path, image):
+        raise MapFileError(f"{path}: {OPEN_ELSEWHERE}")
     found = identify(path, identity, layouts)
     problems = check_hashes(tree)[:1]
     if not problems:
         tree = _upgraded(tree)
         problems = check_tree(tree, found)
-    if problems and is_open_for_writing(image):
+    if problems and is_open_for_writing(path, image):
         raise MapFileError(f"{path}: {OPEN_ELSEWHERE}")
     if problems:
         raise MapFileError(
@@ -242,7 +244,7 @@ def _damaged(
     path: Path, image: bytes, reason: str, layouts: Sequence[Layout]
 ) -> MapFileError:
     """Describe what is wrong with the bytes of an image."""
-    if is_open_for_writing(image):
+    if is_open_for_writing(path, image):
         return MapFileError(f"{path}: {OPEN_ELSEWHERE}")
     return MapFileError(f"{path}: damaged, {reason}; {_expected(layouts)}")
 
