@@ -8,7 +8,7 @@ import subprocess
 import sys
 import textwrap
 from collections.abc import Callable
-from typing import Literal
+from typing import Literal, get_args
 
 import matplotlib as mpl
 import numpy as np
@@ -21,7 +21,7 @@ from reachmap.plots.parts.style import (
     CHANGE_MAP,
     COST_MAP,
     DIFFERENCE_MAP,
-    PERCENT_MAPS,
+    PercentMap,
     axes_at,
     colour_map,
     contrast_ratio,
@@ -31,6 +31,8 @@ from reachmap.plots.parts.style import (
     new_figure,
     put_title,
 )
+
+PERCENT_MAPS = get_args(PercentMap)
 
 HASH = "5" * 64
 

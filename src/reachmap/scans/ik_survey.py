@@ -234,17 +234,17 @@ def join_surveys(surveys: Sequence[Survey]) -> Survey:
 
 class _Surveyor:
     def __init__(self, scene: Scene, T_base_tcp: FloatArray, approach_m: float) -> None:
-        self._scene, self._T = scene, T_base_tcp
-        self._approach = StraightApproach(
-            scene.kinematics,
-            scene.motions,
-            axis_vector(scene.loaded.cell.robot.tcp.approach_axis),
-            approach_m,
-        )
+        self._scene, self._T, self._approach_m = scene, T_base_tcp, approach_m
         self._windings = Windings(scene.robot)
         count = len(T_base_tcp)
         self._status = np.full(count, Status.NO_IK, np.uint8)
         self._pair = np.full(count, NO_PAIR, np.int64)
+
+    @cached_property
+    def _approach(self) -> StraightApproach:
+        scene = self._scene
+        axis = axis_vector(scene.loaded.cell.robot.tcp.approach_axis)
+        return StraightApproach(scene.kinematics, scene.motions, axis, self._approach_m)
 
     def survey(self) -> Survey:
         """Solve all frames, then look at each frame's configurations."""
@@ -280,7 +280,7 @@ class _Surveyor:
             self._status[k] = Status.IK_IN_COLLISION
             self._pair[k] = self._scene.checker.blocking_pair_of_many(Q)
             return []
-        if self._approach.distance_m == 0:
+        if self._approach_m == 0:
             self._status[k] = Status.NOT_ATTEMPTED
             return [q[None] for q in Q[free]]
         ways = [w for q in Q[free] if (w := self._way(self._pose(k, q), q)) is not None]

@@ -23,7 +23,6 @@ from matplotlib.text import Text
 from reachmap._typing import FloatArray
 
 PercentMap: TypeAlias = Literal["RdYlGn", "viridis", "cividis"]
-PERCENT_MAPS: tuple[PercentMap, ...] = ("RdYlGn", "viridis", "cividis")
 Format: TypeAlias = Literal["png", "svg"]
 
 DIFFERENCE_MAP = "Purples"
