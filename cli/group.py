@@ -143,6 +143,24 @@ def _distinct_broken_pipe() -> Iterator[None]:
         raise PipeClosedError from error
 
 
+@contextmanager
+def _named_arguments() -> Iterator[None]:
+    """Say of an argument that was given like an option that it stands by itself."""
+    try:
+        yield
+    except click.NoSuchOption as error:
+        context, asked = error.ctx, error.option_name.lstrip("-")
+        for one in context.command.params if context else ():
+            name = (one.metavar or one.name or "").strip("[].").lower()
+            if context and isinstance(one, click.Argument) and name == asked:
+                raise click.UsageError(
+                    f"No such option {error.option_name!r}: {asked} is an argument, "
+                    f"as in `{context.command_path} {asked.upper()}`.",
+                    context,
+                ) from None
+        raise
+
+
 class PipelineGroup(click.Group):
     """A click group that knows its commands by table and imports them on use."""
 
@@ -212,7 +230,7 @@ class PipelineGroup(click.Group):
 
     def invoke(self, ctx: click.Context) -> Any:
         """Run the command; a closed pipe is distinguished from a failure."""
-        with _distinct_broken_pipe():
+        with _distinct_broken_pipe(), _named_arguments():
             return super().invoke(ctx)
 
     def main(  # type: ignore[override]

@@ -149,6 +149,23 @@ def test_a_near_miss_is_suggested(run: Callable[..., Result]) -> None:
     assert "No such command 'optoins'. Did you mean options?" in result.stderr
 
 
+@pytest.mark.parametrize(
+    ("command", "option", "usage"),
+    [
+        ("workspace-scan", "--cell", "workspace-scan CELL"),
+        ("validate", "--map", "validate MAP"),
+        ("bin-scan", "--placement", "bin-scan PLACEMENT"),
+    ],
+)
+def test_an_argument_given_like_an_option(
+    command: str, option: str, usage: str
+) -> None:
+    """The message shows where it belongs."""
+    result = CliRunner().invoke(group, [command, option, "x"], prog_name="reachmap")
+    assert result.exit_code == 2
+    assert f"is an argument, as in `reachmap {usage}`" in result.stderr
+
+
 def test_commands_that_are_not_installed_are_hidden(run: Callable[..., Result]) -> None:
     """A table line without its module is neither listed nor found."""
     assert "absent" not in run("--help").stdout
