@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import tempfile
 from functools import partial
 from pathlib import Path
@@ -78,6 +79,35 @@ def test_maps_with_shared_work_are_those_from_scratch(
     for name, outcome in alone["outcomes"].items():
         for field, value in outcome.items():
             assert np.array_equal(shared["outcomes"][name][field], value, True)
+
+
+def test_maps_do_not_depend_on_where_the_camera_looks_from(
+    memo: Memo, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where the bin is kept, another camera takes all work over; hashes are equal."""
+    context = variant.VariantContext(
+        objectives=OBJECTIVES, places_bin=False, workspaces=[]
+    )
+
+    def mapped(height_m: float) -> dict[str, Any]:
+        camera = {"parent": "link_3", "xyz": [0, 0, height_m], "range_m": [0.1, 1.0]}
+        camera["field_of_view_deg"] = [60, 40]
+        loaded = toy(*FEW, f"camera={json.dumps(camera)}")
+        return variant.compute_proposal(
+            context, variant.Proposal(row={"cause": ""}, loaded=loaded)
+        )
+
+    first = mapped(0.10)
+    before = memo.computed
+    shared = mapped(0.12)
+    assert memo.computed == before > 0
+    monkeypatch.setattr(variant, "_MEMO", Memo())
+    alone = mapped(0.12)
+    assert not alone["cause"]
+    assert shared["sha256"] == alone["sha256"]
+    assert set(alone["sha256"]) == {"workspace", "bin"}
+    for name in alone["sha256"]:
+        assert first["sha256"][name] != alone["sha256"][name]
 
 
 def test_a_bin_is_placed_without_files(

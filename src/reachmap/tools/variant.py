@@ -30,8 +30,10 @@ from reachmap.tools.place_bin import PlacementChoice, placed_bin
 from reachmap.tools.workspace_scan import workspace_work
 
 OF_WORKSPACE = frozenset({"level_average"})
+# Where the camera looks from matters to place-bin alone; its housing is a body.
+NOT_OF_BIN_MAP = ("camera",)
 # A workspace map is made without the bin, whatever is to be done with it later.
-NOT_OF_WORKSPACE = ("bin", "bin_scan", "placement")
+NOT_OF_WORKSPACE = ("bin", "bin_scan", "placement", *NOT_OF_BIN_MAP)
 # What a message calls artefacts that have no files.
 MAPPED, PLACED = Path("workspace.h5"), Path("placement.h5")
 # What earlier variants have found, in this process.
@@ -178,7 +180,9 @@ def _placed(workspace: WorkspaceMap) -> tuple[LoadedCell, str]:
 
 def _bin_map(loaded: LoadedCell, source_sha256: str) -> BinMap:
     work = bin_scan_work(loaded, source_sha256)
-    payloads = payloads_in_place(work, Scene.shared(loaded, with_bin=True))
+    payloads = payloads_in_place(
+        work, Scene.shared(loaded, with_bin=True), NOT_OF_BIN_MAP
+    )
     record: BinMap = work.kind.assemble(work.document, payloads, run=RunInfo())
     return record
 
