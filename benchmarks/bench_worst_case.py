@@ -1,8 +1,8 @@
 """Worst cases of the placed bin, of the paper's rule and of random poses in hard cells.
 
-``place-bin`` looks at four corners of its tolerance with a coarse sample; here the
-worst of fifteen poses counts: the pose itself, all eight corners in x, y and yaw, and
-the middle of each side, in height too where nothing supports the bin. All poses are
+``place-bin`` looks at its tolerance in the four directions of the plane, and confirms
+what it chose; here the worst of seventeen poses counts: the pose itself and eight
+directions with either turn, in height too where nothing supports the bin. All poses are
 asked in the same way, with more points than ``place-bin`` takes for neighbours, every
 second orientation, and the checks that a map has, of which the search has a quarter:
 what it misses for want of checks is no worse case of the pose. Random poses are
@@ -45,14 +45,13 @@ SEED, TRIES = 1, 4000
 
 
 def neighbourhood(pose: Pose, problem: PlacementProblem) -> Iterator[Pose]:
-    """The pose and what its tolerance allows, corners first."""
+    """The pose and the edge of what its tolerance allows."""
     yield pose
     scale, floats = problem.tolerance.scale, problem.tolerance.floats
-    for x, y, yaw in product((1.0, -1.0), repeat=3):
-        yield moved_by(pose, scale * [x, y, 0.0, yaw])
-    for axis in (0, 1, 2, 3) if floats else (0, 1, 3):
-        for sign in (1.0, -1.0):
-            yield moved_by(pose, scale * (sign * np.eye(4)[axis]))
+    for angle, turn in product(np.radians(np.arange(0, 360, 45)), (1.0, -1.0)):
+        yield moved_by(pose, scale * [np.cos(angle), np.sin(angle), 0.0, turn])
+    for sign in (1.0, -1.0) if floats else ():
+        yield moved_by(pose, scale * [0.0, 0.0, sign, 0.0])
 
 
 def worst(pose: Pose, problem: PlacementProblem, enough_below: float = -1.0) -> float:

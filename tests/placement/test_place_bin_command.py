@@ -161,7 +161,7 @@ def test_options_and_table_agree_with_the_file(ur5):
     lines = (ur5 / "table.txt").read_text().splitlines()
     chosen = next(line for line in lines if line.endswith("chosen"))
     assert f"{x:+7.3f} {y:+7.3f} {z:+7.3f}" in chosen
-    assert f"{best:.1f}%" in chosen
+    assert f"{best:.1f} ± " in chosen
     assert 2 <= len(pose_rows(lines)) <= 4
     assert any(line.startswith("margin") and "+yaw" in line for line in lines)
     limit = placement.provenance.settings["placement"]["tool_limit_percent"]

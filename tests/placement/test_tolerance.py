@@ -2,24 +2,38 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+from reachmap.cell.loading import read_cell
+from reachmap.core.scene import Scene
 from reachmap.placement.mapped.candidates import Candidate
+from reachmap.placement.mapped.evaluator import open_evaluator
 from reachmap.placement.mapped.exact import PoseScore
+from reachmap.placement.mapped.sample import open_frames
 from reachmap.placement.tolerance import (
     NOISE_POINTS,
     ROOM,
     Tolerance,
     away_from_losses,
+    confirmed_worst,
+    moved_by,
     worst_case,
 )
+from reachmap.runtime.options import RunOptions
+from reachmap.runtime.progress import Progress
 from tests.support.closed_form_evaluator import ClosedForm
 from tests.support.optional import present
 
 TOLERANCE = Tolerance(shift_m=0.03, turn_rad=np.radians(5.0))
 SCALE = np.array([0.03, 0.03, 0.03, np.radians(5.0)])
 POSE = (0.5, 0.1, 0.0, 0.4)
+HARD_CELLS = Path(__file__).parents[2] / "benchmarks" / "hard_cells"
+CHECKS = ("roadmap.max_checks=2000", "roadmap.sample_checks=4000")
+# More points than the bin of the cell has, all of its orientations.
+EVERY_GRASP = (8, 6, 1)
 
 
 def candidate(pose, formula):
@@ -77,6 +91,47 @@ def test_where_the_bin_cannot_stand_the_worst_case_is_nothing():
     assert found.score == 0.0
     moved = present(away_from_losses(POSE, TOLERANCE, found, NOISE_POINTS))
     assert moved[1] == pytest.approx(POSE[1] - ROOM * 0.03)
+
+
+@pytest.mark.slow
+def test_what_few_grasps_hide_is_confirmed_with_more():
+    """In the window, a neighbour loses what the quick sample does not look at.
+
+    Every test grasp of all neighbours, each mapped alone, says how much.
+    """
+    loaded = read_cell(str(HARD_CELLS / "window-ur5.yaml"), CHECKS)
+    scene = Scene.shared(loaded, with_bin=False)
+    is_open = open_frames(scene.robot, loaded)
+    pose, q = (0.0875, 0.525, -0.03, 0.0), scene.scan_configuration
+    tolerance = Tolerance(shift_m=0.03, turn_rad=np.radians(5.0), floats=True)
+    quiet = RunOptions(workers=1, quiet=True)
+    progress = Progress("test", quiet=True)
+    with open_evaluator(loaded, is_open, quiet, progress=progress) as evaluator:
+        (here,) = evaluator.evaluate([pose], q)
+        found = Candidate(pose=pose, score=here.score, exact=True)
+        quick = worst_case(found, tolerance, q, lambda pose: True, evaluator)
+        confirmed = confirmed_worst(found, quick, tolerance, q, evaluator)
+        offsets = np.vstack([tolerance.offsets(), tolerance.mirrored()])
+        neighbours = [moved_by(pose, offset) for offset in offsets]
+        every = evaluator.evaluate(neighbours, q, grid=EVERY_GRASP)
+    true = min(present(evaluation.score).score for evaluation in every)
+    assert quick.score == present(here.score).score
+    assert confirmed == pytest.approx(true)
+    assert true < quick.score - NOISE_POINTS
+
+
+def test_a_loss_that_only_another_turn_shows_counts():
+    """A score that falls where the bin is shifted one way and turned the other."""
+
+    def score(pose):
+        x, _, _, yaw = (np.array(pose) - POSE) / SCALE
+        return 90.0 - 8.0 * max(-x * yaw, 0.0)
+
+    evaluator, found = ClosedForm(score), candidate(POSE, score)
+    quick = worst_case(found, TOLERANCE, None, lambda pose: True, evaluator)
+    assert quick.score == 90.0
+    confirmed = confirmed_worst(found, quick, TOLERANCE, None, evaluator)
+    assert confirmed == pytest.approx(82.0)
 
 
 def test_the_worst_case_bounds_poses_inside_a_cone():

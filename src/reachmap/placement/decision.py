@@ -22,7 +22,7 @@ from reachmap.placement.paper_rule import LatticePoint, choose_by_paper
 from reachmap.placement.predicted.places import apart_m, rank_key
 from reachmap.placement.problem import PlacementProblem
 from reachmap.placement.scan_choice import FINALISTS, ScanChoice, choose_scan
-from reachmap.placement.steadying import worst_of
+from reachmap.placement.steadying import stated_worst
 from reachmap.sampling.frames import approach_distance_m
 from reachmap.scans.ik_survey import survey_frames
 
@@ -222,8 +222,9 @@ def settle(problem: PlacementProblem, decision: Decision) -> Outcome:
             rows[row] = Candidate(pose=rows[row].pose, exact=True, reason=UNSEEN)
             continue
         pose = rows[row].pose
-        if rows[row].worst is None and not problem.tolerance.is_none:
-            worst = worst_of(problem, rows[row]).score
+        if not problem.tolerance.is_none:
+            # What was confirmed before is known.
+            worst = stated_worst(problem, rows[row])
             rows[row] = dataclasses.replace(rows[row], worst=worst)
         chosen = row
         if scan.is_new:

@@ -18,6 +18,7 @@ def placement_settings() -> dict[str, Any]:
             "predicted": list(prediction.POINTS),
             "thin": list(sample.THIN),
             "coarse": list(sample.COARSE),
+            "dense": list(sample.DENSE),
             "quick": list(sample.QUICK),
         },
         "max_layers": sample.MAX_LAYERS,

@@ -15,6 +15,7 @@ from reachmap.placement.tolerance import (
     NOISE_POINTS,
     WorstCase,
     away_from_losses,
+    confirmed_worst,
     moved_by,
     worst_case,
 )
@@ -32,7 +33,8 @@ def steadied(problem: PlacementProblem, mapped: list[Candidate]) -> list[Candida
     The best few are looked at with their neighbours, and each is moved away from what
     its neighbours lose. Of worst cases that are equal within the error
     of the scores the widest margin decides, then the shorter paths, then how square the
-    bin stands.
+    bin stands. The worst case of the first is confirmed with more test grasps; where
+    it was too high, those of its rivals are, too.
 
     Parameters
     ----------
@@ -58,7 +60,19 @@ def steadied(problem: PlacementProblem, mapped: list[Candidate]) -> list[Candida
             found.append(_looked_at(problem, moved))
             if found[-1][1].score <= worst.score:
                 break
-    return _in_order(problem, [candidate for candidate, _ in found])
+    return _confirmed(
+        problem, _in_order(problem, [found_one for found_one, _ in found])
+    )
+
+
+def stated_worst(problem: PlacementProblem, candidate: Candidate) -> float:
+    """Worst case of a pose under the tolerance asked for, confirmed [percent]."""
+    worst = worst_of(problem, candidate)
+    if worst.score == 0.0:
+        return 0.0
+    return confirmed_worst(
+        candidate, worst, problem.tolerance, problem.start, problem.evaluator
+    )
 
 
 def worst_of(problem: PlacementProblem, candidate: Candidate) -> WorstCase:
@@ -104,11 +118,33 @@ def _in_order(problem: PlacementProblem, found: list[Candidate]) -> list[Candida
     found = sorted(found, key=lambda c: (-(c.worst or 0.0), rank_key(c)))
     best = found[0]
     assert best.worst is not None
-    assert best.score is not None
-    error = max(float(np.nan_to_num(best.score.error)), LEAST_ERROR)
-    equal = [c for c in found if (c.worst or 0.0) >= best.worst - error]
+    equal = [c for c in found if (c.worst or 0.0) >= best.worst - _error(best)]
     others = [c for c in found if c not in equal]
     return [*_by_margin(problem, equal), *others]
+
+
+def _confirmed(problem: PlacementProblem, rivals: list[Candidate]) -> list[Candidate]:
+    """Candidates with the worst case of the first, and of its rivals, confirmed.
+
+    One after the other, until no other promises more than the best that is confirmed.
+    """
+    confirmed: list[Candidate] = []
+    for k, candidate in enumerate(rivals):
+        worst = stated_worst(problem, candidate)
+        confirmed.append(dataclasses.replace(candidate, worst=worst))
+        best = max(c.worst or 0.0 for c in confirmed)
+        if all((c.worst or 0.0) <= best + _error(candidate) for c in rivals[k + 1 :]):
+            break
+    # As they were among equals.
+    first = next(c for c in confirmed if (c.worst or 0.0) >= best - _error(c))
+    others = [c for c in confirmed if c is not first]
+    return [first, *others, *rivals[len(confirmed) :]]
+
+
+def _error(candidate: Candidate) -> float:
+    """Worst cases are equal within this [points]."""
+    assert candidate.score is not None
+    return max(float(np.nan_to_num(candidate.score.error)), LEAST_ERROR)
 
 
 def _by_margin(problem: PlacementProblem, equal: list[Candidate]) -> list[Candidate]:

@@ -9,9 +9,9 @@ import numpy as np
 
 from reachmap._typing import FloatArray
 from reachmap.placement.mapped.candidates import Candidate
-from reachmap.placement.mapped.evaluator import Evaluator
+from reachmap.placement.mapped.evaluator import Evaluation, Evaluator
 from reachmap.placement.mapped.exact import Pose
-from reachmap.placement.mapped.sample import QUICK
+from reachmap.placement.mapped.sample import DENSE, QUICK, THIN
 
 # A pose is moved away from what its neighbours miss by this much more than the
 # tolerance, so that what is found there has some room left.
@@ -130,6 +130,55 @@ def worst_case(
     # No more was looked for where the rest is the sample's noise.
     lost[lost <= NOISE_POINTS] = 0.0
     return WorstCase(score=max(own - float(lost.max()), 0.0), lost=lost)
+
+
+def confirmed_worst(
+    candidate: Candidate,
+    worst: WorstCase,
+    tolerance: Tolerance,
+    q: FloatArray | None,
+    evaluator: Evaluator,
+) -> float:
+    """Least score of a pose and of its neighbours, from more test grasps [percent].
+
+    Few grasps hide points that a neighbour loses. The shifts in the plane are looked at
+    with the other turn and more grasps; where they, or those before, lose more than a
+    sample's noise, the worst of them has every orientation.
+
+    Parameters
+    ----------
+    candidate : Candidate
+        With an exact score.
+    worst : WorstCase
+        Of the candidate, from the quick sample; the bin can stand at all neighbours.
+    tolerance : Tolerance
+    q : array, shape (dof,), or None
+        Scan configuration; see :meth:`Evaluator.evaluate`.
+    evaluator : Evaluator
+    """
+    assert candidate.score is not None
+    own, mirrored = candidate.score.score, tolerance.mirrored()
+    in_plane = mirrored[mirrored[:, 2] == 0.0]
+    offsets = np.vstack([tolerance.offsets(), in_plane])
+    poses = [moved_by(candidate.pose, offset) for offset in offsets]
+    others = poses[-len(in_plane) :]
+    evaluator.expect(len(others) + 3)
+    here = _score(evaluator.evaluate([candidate.pose], q, grid=THIN)[0])
+    found = evaluator.evaluate(others, q, enough=here, grid=THIN)
+    lost = np.array([max(here - _score(evaluation), 0.0) for evaluation in found])
+    suspects = [
+        pose[int(loss.argmax())]
+        for pose, loss in ((poses, worst.lost), (others, lost))
+        if loss.max() > NOISE_POINTS
+    ]
+    if not suspects:
+        return own - float(lost.max())
+    dense = evaluator.evaluate(suspects, q, enough=own, grid=DENSE)
+    return min(own, *map(_score, dense))
+
+
+def _score(evaluation: Evaluation) -> float:
+    return 0.0 if evaluation.score is None else evaluation.score.score
 
 
 def away_from_losses(

@@ -18,6 +18,7 @@ import numpy as np
 from reachmap._typing import FloatArray, IntArray
 from reachmap.cell.model.shapes import Solid, box_corners, corner_points
 from reachmap.core.collision.shapes import convex_hull
+from reachmap.core.robot.chain import cross
 
 if TYPE_CHECKING:
     from reachmap.core.collision.bodies import BodyGeometry
@@ -194,7 +195,7 @@ class MotionBound:
         sliding = axis * np.where(is_revolute, 0.0, change)
         # Velocity of a point X on joint k: Σ_{j ≤ k} (a_j × (X − o_j)) Δ_j.
         angular = np.cumsum(turning, axis=1)
-        linear = np.cumsum(sliding + _cross(origin, turning), axis=1)
+        linear = np.cumsum(sliding + cross(origin, turning), axis=1)
         corners = frames[..., :3, :3] @ self._corners + origin[..., None]
         # Coordinates first, and no np.cross: this is called for every motion.
         ux, uy, uz = (linear[:, :, k, None] for k in range(3))
@@ -204,17 +205,6 @@ class MotionBound:
         square += (uy + wz * x - wx * z) ** 2
         square += (uz + wx * y - wy * x) ** 2
         return np.asarray(np.sqrt(square.max(axis=2)))
-
-
-def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
-    """Cross products along the last axis, for small arrays faster than numpy's."""
-    ax, ay, az = a[..., 0], a[..., 1], a[..., 2]
-    bx, by, bz = b[..., 0], b[..., 1], b[..., 2]
-    c = np.empty(a.shape)
-    c[..., 0] = ay * bz - az * by
-    c[..., 1] = az * bx - ax * bz
-    c[..., 2] = ax * by - ay * bx
-    return c
 
 
 def _bodies_corners(bodies: BodyGeometry) -> list[tuple[Any, FloatArray]]:

@@ -95,6 +95,7 @@ def connect(
     seed: int,
     on_frame: Callable[[], object] = lambda: None,
     is_enough: Callable[[BoolArray], bool] = lambda reached: False,
+    known: dict[bytes, bool] | None = None,
 ) -> Connection:
     """Find which frames the scan configuration is connected to.
 
@@ -111,11 +112,14 @@ def connect(
     is_enough : callable
         Is told which frames straight motions reach; where that will do, nothing is
         planned, and the rest is in no component.
+    known : dict, optional
+        Motions that were verified for another start or other goals, see
+        :class:`.KnownMotions`.
     """
     windings = Windings(motions.checker.robot)
     turns = windings.nearest(goals.Q, start, goals.low, goals.high)
     roadmap = Roadmap.of(start, goals.turned(turns))
-    connector = _Connector(roadmap, motions, windings, spec, seed, on_frame)
+    connector = _Connector(roadmap, motions, windings, spec, seed, on_frame, known)
     connector.connect(is_enough)
     return connector.connection()
 
@@ -141,6 +145,7 @@ class _Connector:
         spec: RoadmapSpec,
         seed: int,
         on_frame: Callable[[], object],
+        known: dict[bytes, bool] | None,
     ) -> None:
         self._roadmap, self._motions = roadmap, motions
         self._windings, self._spec, self._seed = windings, spec, seed
@@ -156,7 +161,7 @@ class _Connector:
         self._sample_checks_left = _FULL_SEARCHES * spec.sample_checks
         self._nearest = NearestReached(roadmap, self._Q, self._weight, windings)
         self._candidates = CandidateMotions.of(self._Q, self._weight, windings, spec)
-        self._known = KnownMotions(motions, len(self._Q))
+        self._known = KnownMotions(motions, len(self._Q), known)
         self._explorer = Explorer(
             roadmap, self._candidates, self._known, windings, on_frame
         )

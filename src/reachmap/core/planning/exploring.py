@@ -31,10 +31,18 @@ class KnownMotions:
     motions : MotionChecker
     nodes : int
         Number of start and goals.
+    before : dict, optional
+        What was verified before, by the bytes of both ends; what is new is added.
     """
 
-    def __init__(self, motions: MotionChecker, nodes: int) -> None:
+    def __init__(
+        self,
+        motions: MotionChecker,
+        nodes: int,
+        before: dict[bytes, bool] | None = None,
+    ) -> None:
         self._motions, self._nodes = motions, nodes
+        self._before = {} if before is None else before
         self._known: dict[int, bool] = {}
 
     def is_verified(self, a: int, b: int, q_from: FloatArray, q_to: FloatArray) -> bool:
@@ -42,7 +50,10 @@ class KnownMotions:
         key = min(a, b) * self._nodes + max(a, b)
         known = self._known.get(key)
         if known is None:
-            known = self._known[key] = self._motions.is_verified(q_from, q_to)
+            ends = q_from.tobytes() + q_to.tobytes()
+            if ends not in self._before:
+                self._before[ends] = self._motions.is_verified(q_from, q_to)
+            known = self._known[key] = self._before[ends]
         return known
 
 

@@ -191,7 +191,7 @@ class SerialChain:
         z, arm = F[:, :, :3, 2], T[:, None, :3, 3] - F[:, :, :3, 3]
         J = np.zeros((len(Q), 6, self.dof))
         J[:, :3] = np.swapaxes(
-            np.where(self.is_revolute[:, None], np.cross(z, arm), z), 1, 2
+            np.where(self.is_revolute[:, None], cross(z, arm), z), 1, 2
         )
         J[:, 3:] = np.swapaxes(np.where(self.is_revolute[:, None], z, 0.0), 1, 2)
         return T, J
@@ -209,6 +209,17 @@ class SerialChain:
             steps[k] = self.T_fixed[k]
             steps[k, :, :, 3] += Q[:, k, None] * self.T_fixed[k, :, 2]
         return np.asarray(steps)
+
+
+def cross(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Cross products along the last axis, for small arrays faster than numpy's."""
+    ax, ay, az = a[..., 0], a[..., 1], a[..., 2]
+    bx, by, bz = b[..., 0], b[..., 1], b[..., 2]
+    c = np.empty(a.shape)
+    c[..., 0] = ay * bz - az * by
+    c[..., 1] = az * bx - ax * bz
+    c[..., 2] = ax * by - ay * bx
+    return c
 
 
 def pose_error(T_goal: FloatArray, T: FloatArray) -> FloatArray:

@@ -159,6 +159,7 @@ class PlacedScene:
         )
         self._survey()
         self._first: _Goals | None = None
+        self._known_motions: dict[bytes, bool] = {}
 
     def _survey(self) -> None:
         """Solve for all frames, and find the first free branch of each.
@@ -312,6 +313,7 @@ class PlacedScene:
             effort(cell.roadmap),
             seed=cell.seed,
             is_enough=lambda reached: self._percent(reached) >= enough,
+            known=self._known_motions,
         )
 
     def _percent(self, reached: BoolArray) -> float:

@@ -78,13 +78,18 @@ def imaging_configurations(
         windings=False,
         near=scene.scan_configuration,
     )
-    free = scene.checker.free_mask(Q)
-    Q, pose = Q[free], pose[free]
+    is_free = scene.checker.is_free
+    if goals is not None:
+        # Sorting takes longer than checking where there are goals.
+        free = scene.checker.free_mask(Q)
+        Q, pose = Q[free], pose[free]
     corners = _corners(scene)
     chosen: list[FloatArray] = []
     for k in np.lexsort((_farness(Q, goals, frame), missing[pose])):
         q = Q[k]
         if any(np.linalg.norm(q - other) < APART_RAD for other in chosen):
+            continue
+        if goals is None and not is_free(q):
             continue
         if camera.hidden_by(q, T_base_camera[pose[k]], corners):
             continue

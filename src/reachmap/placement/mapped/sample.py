@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 # Points along the longer and the shorter side; of the orientations every n-th.
 Grid = tuple[int, int, int]
 COARSE: Grid = (8, 6, 3)
+DENSE: Grid = (8, 6, 1)
 THIN: Grid = (6, 5, 3)
 QUICK: Grid = (4, 3, 3)
 MAX_LAYERS = 3
