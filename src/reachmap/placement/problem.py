@@ -101,7 +101,7 @@ class PlacementProblem:
         """Why the bin cannot stand at a pose, or ""; it may float if that is said."""
         outside = self.region.outside(np.array(pose))
         if outside:
-            return f"{outside} is outside the region"
+            return f"outside the region in {outside}"
         if self.supports and not floats:
             overhang = self._overhang(pose)
             if overhang:

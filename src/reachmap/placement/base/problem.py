@@ -68,7 +68,7 @@ class BaseProblem:
     def reason_against(self, pose: Pose) -> str:
         """Why the base cannot stand at a pose, or ""."""
         outside = self.region.outside(np.array(pose))
-        return f"{outside} is outside the region" if outside else self.contact(pose)
+        return f"outside the region in {outside}" if outside else self.contact(pose)
 
     def contact(self, pose: Pose) -> str:
         """What the base would collide with, or that no drop-off is in reach, or ""."""
