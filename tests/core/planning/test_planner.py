@@ -171,6 +171,22 @@ def test_goals_outside_the_limits_are_not_waited_for():
     assert scene.planner.plan(scene.scan_configuration, both, 1).goal == 1
 
 
+def test_goals_in_collision_are_not_waited_for():
+    """OMPL would wait for other goals; nothing is spent where there are none."""
+    scene = scene_of("planar-toy")
+    Q = np.random.default_rng(0).uniform(-1.5, 1.5, (400, 3))
+    blocked = Q[~scene.checker.free_mask(Q)][:3]
+    assert len(blocked) == 3
+    for name in ("RRTConnect", "LBKPIECE1"):
+        planner = planner_of(scene, name=name, straight_first=False)
+        plan = planner.plan(scene.scan_configuration, blocked, 1)
+        assert plan.path is None
+        assert plan.checks < 20
+        assert not plan.hit_time_limit
+        both = np.vstack([blocked, [[1.5, 0.2, 0.0]]])
+        assert planner.plan(scene.scan_configuration, both, 1).goal == 3
+
+
 @pytest.mark.parametrize(
     "name",
     [

@@ -154,10 +154,8 @@ class OmplSearch:
         ou.RNG.setSeed(int(seed.generate_state(1)[0]) or 1)
         space = self._space()
         information = ob.SpaceInformation(space)
-        checker, dof = self._motions.checker, range(starts.shape[1])
-        information.setStateValidityChecker(
-            lambda state: checker.is_free(np.array([state[i] for i in dof]))
-        )
+        states = _States(self._motions.checker, goals)
+        information.setStateValidityChecker(states.is_valid)
         information.setMotionValidator(_MotionValidator(information, self._motions))
         information.setup()
         problem = ob.ProblemDefinition(information)
@@ -174,7 +172,11 @@ class OmplSearch:
         planner = self._planner(information)
         planner.setProblemDefinition(problem)
         planner.setup()
-        planner.solve(ob.PlannerTerminationCondition(budget.search_ends))
+        planner.solve(
+            ob.PlannerTerminationCondition(
+                lambda: states.no_goal_is_valid() or budget.search_ends()
+            )
+        )
         if not problem.hasExactSolution():
             return None
         return FoundPath(information, problem.getSolutionPath(), starts.shape[1])
@@ -217,6 +219,28 @@ class OmplSearch:
         return ob.RealVectorOrthogonalProjectionEvaluator(
             information.getStateSpace(), [cell_rad] * len(joints), joints.tolist()
         )
+
+
+class _States:
+    """Which states are free; knows when no goal is.
+
+    A goal that a verified motion leads to may be nearer to a body than the margin.
+    Where all of them are, OMPL would wait for others until the budget ends.
+    """
+
+    def __init__(self, checker: CollisionChecker, goals: FloatArray) -> None:
+        self._checker, self._dof = checker, range(goals.shape[1])
+        self._open_goals = {q.tobytes() for q in goals}
+
+    def is_valid(self, state: Any) -> bool:
+        q = np.array([state[i] for i in self._dof])
+        free = self._checker.is_free(q)
+        if not free:
+            self._open_goals.discard(q.tobytes())
+        return free
+
+    def no_goal_is_valid(self) -> bool:
+        return not self._open_goals
 
 
 class _MotionValidator(ob.MotionValidator):  # type: ignore[misc]
