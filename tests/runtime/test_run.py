@@ -4,6 +4,7 @@ import json
 import multiprocessing
 import os
 import signal
+import time
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from dataclasses import replace
@@ -60,6 +61,20 @@ def test_the_artefact_is_what_the_function_says(output, workers):
     assert isinstance(outcome.run, RunInfo)
     assert outcome.run.workers == workers
     assert outcome.run.cpu_s["units"] >= 0
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_cpu_time_of_units_counts_once(output, workers):
+    """Whether this process computes them or others do."""
+    begin = time.process_time()
+    outcome, _ = run(output, Toy(units=10, busy_s=0.05), workers=workers)
+    own_s = time.process_time() - begin
+    assert outcome.run.cpu_s["units"] >= 0.49
+    if workers == 1:
+        assert outcome.run.cpu_s["units"] <= own_s
+    else:
+        # What the workers do beside the units is not theirs.
+        assert outcome.run.cpu_s["units"] < 0.9 + own_s
 
 
 @pytest.mark.parametrize("workers", [1, 2])

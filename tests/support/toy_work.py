@@ -31,12 +31,13 @@ class Toy:
 
     ``poison`` units kill their worker, ``moody`` ones only the first time (``marks``
     is a folder that remembers), ``buggy`` ones raise, ``wrong`` ones find bad input.
-    ``ballast`` makes the context that large [bytes].
+    ``ballast`` makes the context that large [bytes]; each unit computes for ``busy_s``.
     """
 
     units: int = 40
     seed: int = 1
     pause_s: float = 0.0
+    busy_s: float = 0.0
     poison: tuple[int, ...] = ()
     moody: tuple[int, ...] = ()
     buggy: tuple[int, ...] = ()
@@ -64,6 +65,9 @@ def prepare(toy):
 def compute(toy, unit):
     """One payload: numbers of every sort, from the seed and the unit alone."""
     time.sleep(toy.pause_s)
+    end = time.thread_time() + toy.busy_s
+    while time.thread_time() < end:
+        pass
     if unit in toy.poison:
         os.kill(os.getpid(), signal.SIGKILL)
     if unit in toy.moody and not (mark := Path(toy.marks) / str(unit)).exists():

@@ -151,7 +151,6 @@ def run_scan(work: Work, *, output: Path, options: RunOptions, label: str) -> Ou
         results,
         store,
     ):
-        clock.add_cpu(UNITS, results.cpu_s)
         info = clock.finish()
         path, artefact = store.path, None
         if options.shard is None:
@@ -250,6 +249,7 @@ class _Run:
         self, phase: str, job: Job, units: Sequence[Any], *, most: int | None = None
     ) -> list[Any]:
         """Payloads of all units of a job of its own, on at most ``most`` workers."""
+        self.count_earlier(phase)
         with self.clock.phase(phase):
             self.complete(phase, job, dict(enumerate(units)), len(units), most)
         for index, text in self.store.failed(phase).items():
@@ -279,6 +279,11 @@ class _Run:
             self.label if phase == UNITS else f"{self.label} {phase.replace('_', ' ')}"
         )
         return Progress(label, quiet=self.options.quiet)
+
+    def count_earlier(self, phase: str) -> None:
+        """Add the CPU time of the units that an earlier run computed."""
+        done = self.store.results(phase).values()
+        self.clock.add_cpu(phase, sum(measure.cpu_s for measure in done))
 
     def complete(
         self,
@@ -327,6 +332,8 @@ class _Run:
                     progress.tick()
                     continue
                 self.store.put(reply, phase)
+                if not slots[0].is_here:  # where the phase counts them itself
+                    self.clock.add_cpu(phase, reply.measure.cpu_s)
                 if reply.failed:
                     text = decode(reply.text)
                     log.warning("unit %d failed: %s", reply.index, last_line(text))
@@ -337,6 +344,7 @@ class _Run:
 def _compute_missing(work: Work, run: _Run) -> None:
     own = {index: work.units[index] for index in run.store.header.own_units()}
     left = len(own) - run.store.resumed
+    run.count_earlier(UNITS)
     if run.store.resumed:
         log.info("%d units were done before, %d are left", run.store.resumed, left)
     if left and (job := work.job(run)) is not None:
