@@ -13,7 +13,7 @@ from reachmap.core.collision.bin_fit import BinFit
 from reachmap.core.scene import Scene
 from reachmap.geometry import yaw_transform
 from reachmap.placement.predicted.region import Region
-from reachmap.placement.supports import has_room, natural_poses
+from reachmap.placement.supports import has_room, natural_poses, supports_in
 
 EVERYWHERE = Region(
     low=np.array([-2.0, -2.0, -1.0, 0.0]), high=np.array([2.0, 2.0, 1.0, np.pi])
@@ -57,3 +57,32 @@ def test_the_pose_in_the_cell_is_always_among_them():
     loaded = read_cell("planar-toy")
     own = natural_poses(loaded.cell, EVERYWHERE, ())[0]
     assert yaw_transform(*own) == pytest.approx(loaded.cell.T_base_bin(), abs=1e-8)
+
+
+BELT = {
+    "name": "belt",
+    "shape": {"box": [1.0, 0.6, 0.02]},
+    "pose": {"xyz": [0.5, 0.9, -0.4]},
+}
+PART = "part={shape: {box: [0.02, 0.02, 0.02]}, pose: {xyz: [0, 0, 0.01]}}"
+
+
+def supports_with(*overrides: str) -> list[str]:
+    """Names of what the toy's bin may stand on where there is a belt."""
+    loaded = read_cell("planar-toy", [f"bodies.0={json.dumps(BELT)}", *overrides])
+    scene = Scene.build(loaded, with_bin=False)
+    faces = top_faces(loaded.cell, np.eye(4))
+    fit = BinFit(scene.robot, loaded, None)
+    return [face.name for face in supports_in(loaded.cell, EVERYWHERE, faces, fit)]
+
+
+def test_a_belt_that_takes_parts_away_carries_no_bin():
+    """Unless the cell has its bin there, or names it."""
+    onto_it = "drop_off={name: out, frame: belt, pose: {xyz: [0, 0, 0.05]}}"
+    assert supports_with() == ["belt"]
+    assert supports_with(PART, onto_it) == []
+    assert supports_with(PART, onto_it, "bin.on=belt", "bin.pose.xyz=[0.5,0.9,0]") == [
+        "belt"
+    ]
+    height = -0.39 + read_cell("planar-toy").cell.bin.bottom_m
+    assert supports_with(PART, onto_it, f"bin.pose.xyz=[0.5,0.9,{height}]") == ["belt"]

@@ -19,6 +19,7 @@ from reachmap.core.collision.bin_fit import BinFit
 from reachmap.core.scene import Scene
 from reachmap.geometry import yaw_transform
 from reachmap.maps.records import WorkspaceMap
+from reachmap.placement.drop_off_room import DropOffRoom
 from reachmap.placement.mapped.candidates import Candidate, mapped_candidates
 from reachmap.placement.mapped.evaluator import Evaluator
 from reachmap.placement.mapped.exact import ALWAYS, Pose, bin_at
@@ -71,6 +72,8 @@ class PlacementProblem:
         Whether the cell's own scan configuration stays.
     fit : BinFit
         With the arm at the scan configuration if that stays, else without the arm.
+    drop_offs : DropOffRoom or None
+        What a bin may not stand in; None where parts are put down nowhere.
     evaluator : Evaluator
     """
 
@@ -83,6 +86,7 @@ class PlacementProblem:
     keep_scan: bool
     fit: BinFit
     evaluator: Evaluator
+    drop_offs: DropOffRoom | None = None
     still_camera: FloatArray | None = None
     tolerance: Tolerance = EXACT
     faces: tuple[TopFace, ...] = ()
@@ -110,6 +114,8 @@ class PlacementProblem:
         contact = self.fit.contact(T_base_bin)
         if contact is not None:
             return contact.reason
+        if self.drop_offs is not None and (taken := self.drop_offs.taken(T_base_bin)):
+            return f"the bin leaves no room at the drop-off {taken}"
         if self.still_camera is None:
             return ""
         seen = is_in_picture(self.loaded.cell, self.still_camera, T_base_bin)

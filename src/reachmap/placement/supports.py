@@ -7,7 +7,13 @@ from itertools import chain
 
 import numpy as np
 
-from reachmap.cell.bins.support import SLACK_M, TOUCH_M, TopFace, footprint_of_bin
+from reachmap.cell.bins.support import (
+    SLACK_M,
+    TOUCH_M,
+    TopFace,
+    footprint_of_bin,
+    support_of,
+)
 from reachmap.cell.model.cell import Cell
 from reachmap.core.collision.bin_fit import BinFit
 from reachmap.errors import SettingsError
@@ -23,6 +29,9 @@ def supports_in(
     cell: Cell, region: Region, faces: Sequence[TopFace], fit: BinFit
 ) -> tuple[TopFace, ...]:
     """The body that the cell names, else every one that has room for the bin.
+
+    A body that is the frame of a drop-off, a belt say, is for parts, unless the cell's
+    own bin stands on it.
 
     Parameters
     ----------
@@ -40,7 +49,15 @@ def supports_in(
     low, high = region.low[2] - SLACK_M, region.high[2] + SLACK_M
     within = [face for face in faces if low <= face.z + cell.bin.bottom_m <= high]
     if cell.bin.on is None:
-        return tuple(face for face in within if has_room(cell, region, face, fit))
+        for_parts = {spec.frame for spec in cell.drop_offs if spec.pose is not None}
+        for_parts.discard(
+            support_of(cell.bin, yaw_transform(*pose_of_bin(cell)), tuple(faces))
+        )
+        return tuple(
+            face
+            for face in within
+            if face.name not in for_parts and has_room(cell, region, face, fit)
+        )
     named = tuple(face for face in within if face.name == cell.bin.on)
     if not named:
         raise SettingsError(

@@ -39,6 +39,7 @@ from reachmap.placement.decision import (
     settle,
     why_no_place,
 )
+from reachmap.placement.drop_off_room import DropOffRoom
 from reachmap.placement.mapped.evaluator import Evaluator, open_evaluator
 from reachmap.placement.mapped.exact import Pose
 from reachmap.placement.mapped.imaging import can_choose
@@ -260,6 +261,7 @@ def _problem(
         keep_scan=keep_scan,
         fit=fit,
         evaluator=evaluator,
+        drop_offs=DropOffRoom(scene) if cell.drop_offs else None,
     )
 
 

@@ -13,7 +13,12 @@ from reachmap._typing import BoolArray, FloatArray, IntArray
 from reachmap.cell.model.bin_parts import BinPart
 from reachmap.cell.model.fields import Shape
 from reachmap.cell.model.shapes import corner_points, shrunk
-from reachmap.core.collision.bodies import ROOT, build_geometry, parts_of_bin
+from reachmap.core.collision.bodies import (
+    ROOT,
+    Load,
+    build_geometry,
+    parts_of_bin,
+)
 from reachmap.core.collision.shapes import coal_shape
 from reachmap.core.collision.static_bodies import (
     PlacedBodies,
@@ -126,6 +131,10 @@ class ToolFit:
     ----------
     robot : RobotModel
     loaded : LoadedCell
+    load : Load
+        Whether the tool holds the cell's part.
+    whole : bool
+        Whether the tool must also keep out of the bin's inside.
 
     Attributes
     ----------
@@ -133,9 +142,16 @@ class ToolFit:
         The tool's, in the TCP's frame.
     """
 
-    def __init__(self, robot: RobotModel, loaded: LoadedCell) -> None:
+    def __init__(
+        self,
+        robot: RobotModel,
+        loaded: LoadedCell,
+        *,
+        load: Load = "empty",
+        whole: bool = False,
+    ) -> None:
         q = np.zeros(robot.dof)
-        geometry = build_geometry(robot, loaded, with_bin=False)
+        geometry = build_geometry(robot, loaded, with_bin=False, load=load)
         bodies = bodies_at(robot, geometry, q)
         T_tcp_base = inverse_transform(_tcp_pose(robot, q))
         self.bodies = tuple(
@@ -143,11 +159,12 @@ class ToolFit:
             for b in bodies
             if b.joint == robot.tcp_joint
         )
+        parts = parts_of_bin(loaded)
         self._walls = PlacedBodies(
             (
                 PlacedBody(name=name, joint=ROOT, shape=shape, T=_at(centre))
                 for name, shape, centre in (
-                    _part(part, 0.0) for part in parts_of_bin(loaded)
+                    _part(part, 0.0) for part in ([_around(parts)] if whole else parts)
                 )
             ),
             loaded.cell.collision.safety_margin_m,
