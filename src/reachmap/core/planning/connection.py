@@ -41,8 +41,11 @@ _LEAST, _FEW, _SOME = 0.05, 0.1, 0.2
 # passage may open all of it. Of six searches into a cage two end within 20,000 checks,
 # the other four between 24,000 and 39,000.
 _MUCH, _LONG = 0.1, 3
-# What the components that are open at the end share among them, if they are few.
-_LAST = 2.0
+# What the components that are open at the end share among them, and what one of them
+# may have at most (_LONG). From several starts: under a ceiling 16 of 16 such searches
+# into a pocket along the limit of a joint end, after 11,000 checks on average, and 1 of
+# 6 from the scan configuration alone.
+_LAST = 4.0
 # Where many components stay open, this many searches of samples have their full budget,
 # and the others, which are smaller, a part of it.
 _FULL_SEARCHES, _LEAST_SHARE = 3, 8
@@ -187,8 +190,8 @@ class _Connector:
         self._each_open(self._search_samples)
         self._each_open(self._join_straight)
         self._each_open(lambda part: self._plan_to(part, some, several))
-        last = min(1.0, max(_SOME, _LAST / max(1, len(self._open))))
-        self._each_open(lambda part: self._plan_to(part, self._share(last), starts=1))
+        last = self._share(min(_LONG, max(_SOME, _LAST / max(1, len(self._open)))))
+        self._each_open(lambda part: self._plan_to(part, last, several))
         # New samples: half of them lie around what is still open, which is less now.
         self._samples = None
         self._each_open(self._search_samples)
