@@ -152,10 +152,12 @@ def score_text(candidate: BaseCandidate) -> str:
 
 def margin_text(margin: dict[str, float], rail: str) -> str:
     """Margins of the base as text; those of a rail are named after the joint."""
+
+    def named(direction: str) -> str:
+        return f"{rail} {direction.removeprefix('x')}" if rail else direction
+
     return ", ".join(
-        f"{k} {v:.0f}°"
-        if is_turn(k)
-        else f"{k.replace('x', f'{rail} ') if rail else k} {1000 * v:.0f} mm"
+        f"{k} {v:.0f}°" if is_turn(k) else f"{named(k)} {1000 * v:.0f} mm"
         for k, v in margin.items()
     )
 

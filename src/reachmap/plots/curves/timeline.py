@@ -24,7 +24,7 @@ from reachmap.plots.parts.style import (
 from reachmap.plots.ranking import part_colours, term_label
 
 ROW_IN: Final = 0.36
-WAIT_LABEL: Final = "dwell (image, grip, release)"
+WAIT_LABEL: Final = "waits (image, grip, release)"
 
 
 @drawing()
