@@ -45,7 +45,7 @@ def command(
         as_json=as_json,
     )
     if answer.problems:
-        raise SceneError(f"{answer.source}: {line}" for line in answer.problems)
+        raise SceneError(answer.problems)
 
 
 def _lines(answer: CellCheck, *, verbose: bool) -> Iterator[str]:

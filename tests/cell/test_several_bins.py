@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -87,29 +90,56 @@ def test_every_bin_is_an_obstacle(two):
 
 def test_a_touch_of_a_bin_is_of_all_or_of_one(two):
     """`bin` stands for every bin, a name for its own."""
-    left, both = (
+    right, left, both = (
         Scene.build(
             read_cell(two, [f"bodies.suction tube.touch=[wrist_3_link, {name}]"])
         )
-        for name in ("right", "bin")
+        for name in ("right", "left", "bin")
     )
 
     def pairs(scene):
         return [p for p in scene.checker.body_pairs if p.startswith("suction tube |")]
 
-    assert any("| bin wall" in pair for pair in pairs(left))
-    assert not any("right bin" in pair for pair in pairs(left))
+    assert any("| bin wall" in pair for pair in pairs(right))
+    assert not any("right bin" in pair for pair in pairs(right))
+    assert not any("| bin wall" in pair for pair in pairs(left))
+    assert any("right bin" in pair for pair in pairs(left))
     assert not any("bin " in pair for pair in pairs(both))
 
 
+def test_a_touch_of_a_bin_holds_whichever_is_picked_from(two):
+    """Also in a scene without bins, as of a workspace scan."""
+    shelf = "{name: rest, shape: {box: [0.02, 0.1, 0.3]}, touch: [left]%s}"
+    inside = shelf % ", pose: {xyz: [0.45, 0.18, -0.1]}"
+    for picked in ("left", "right"):
+        loaded = read_cell(two, [f"bodies=[{inside}]", f"pick_from={picked}"])
+        assert not Scene.build(loaded).scan_problems()
+        Scene.build(loaded, with_bin=False)
+    wrong = inside.replace("left", "right")
+    problems = Scene.build(read_cell(two, [f"bodies=[{wrong}]"])).scan_problems()
+    assert [text.split(": ", 1)[1] for text in problems] == [
+        "bins.left.pose: bin bottom touches rest"
+    ]
+
+
 def test_bins_that_meet_are_named(two):
-    """Both of them, and the key of the one that is picked from."""
+    """Both of them, with the line of the one that is picked from."""
     scene = Scene.build(read_cell(two, ["bins.right.pose.xyz.1=0.1"]))
-    problems = scene.scan_problems()
-    assert any(
-        text.startswith("bins.left.pose: bin") and "right bin" in text
-        for text in problems
-    )
+    (problem,) = scene.scan_problems()
+    assert re.search(r"cell.yaml:\d+:\d+: bins.left.pose: bin .* right bin", problem)
+
+
+def test_bins_that_are_not_picked_from_are_looked_at_as_well(two):
+    """One in the pedestal, and two that meet, which are told once."""
+    inside = Scene.build(read_cell(two, ["bins.right.pose.xyz=[0.1, 0, -0.2]"]))
+    (problem,) = inside.scan_problems()
+    assert "bins.right.pose: bin" in problem
+    assert problem.endswith("touches pedestal")
+    third = TRAY % "0.45, -0.25, -0.05"
+    text = Path(two).read_text().replace("  right:", f"  third: {third}\n  right:")
+    Path(two).write_text(text)
+    (problem,) = Scene.build(read_cell(two)).scan_problems()
+    assert re.search(r"bins.third.pose: bin .* touches right bin", problem)
 
 
 def test_carriers_and_supports_are_of_each(tmp_path):
@@ -131,13 +161,14 @@ def test_carriers_and_supports_are_of_each(tmp_path):
     ("change", "message"),
     [
         ("pick_from=rigt", "pick_from: no bin 'rigt'; did you mean 'right'"),
+        ("pick_from=3", "pick_from: expected a name in quotes: left, right (got 3)"),
         ("bins.left.carrier=KLT-99", "bins.left.carrier: no carrier 'KLT-99'"),
         ("bins.rihgt.carrier=KLT-4147", "bins has no key 'rihgt'; did you mean"),
         ("bins.right.carrier=KLT-99", "bins.right.carrier: no carrier 'KLT-99'"),
         ("bins.left.inner=[1, 2]", "bins.left.inner.2: a value is missing"),
         ("bins.right.inner=[1, 2]", "bins.right.inner.2: a value is missing"),
-        ("bins.left.on=shelf", "bins.left.on: 'shelf' is not a body"),
-        ("bins.right.on=shelf", "bins.right.on: 'shelf' is not a body"),
+        ("bins.left.on=flor", "bins.left.on: no body 'flor'; did you mean 'floor'?"),
+        ("bins.right.on=suction tube", "bins.right.on: 'suction tube' has no level"),
         (
             "bins.left.pose.rpy_deg=[90, 0, 0]",
             "bins.left.pose: the bin is tilted 90 deg",
@@ -150,8 +181,24 @@ def test_carriers_and_supports_are_of_each(tmp_path):
 )
 def test_mistakes_name_the_bin(two, change, message):
     """As it is written in the file, whichever is picked from."""
-    with pytest.raises(CellError, match=message.replace("[", r"\[")):
+    with pytest.raises(CellError, match=re.escape(message)):
         read_cell(two, [change])
+
+
+@pytest.mark.parametrize(
+    ("bins", "message"),
+    [
+        ("bins: {}", "bins: expected at least one bin by name, as in left: {"),
+        ("bins:", "bins: expected at least one bin by name, as in left: {"),
+        ("bins: [tray]", "bins: expected a mapping of names to values"),
+        ("bins: tray", "bins: expected a mapping of names to values"),
+    ],
+)
+def test_bins_that_are_none_are_one_mistake(tmp_path, bins, message):
+    """That there is no bin to pick from, then, is not told as well."""
+    with pytest.raises(CellError, match=re.escape(message)) as caught:
+        read_cell(write(tmp_path, f"{bins}\npick_from: left"))
+    assert len(caught.value.lines) == 1
 
 
 def test_names_must_be_free(tmp_path):

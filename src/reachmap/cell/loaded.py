@@ -20,7 +20,10 @@ from reachmap.cell.files.resources import NotFoundError, Resolver
 from reachmap.cell.files.urdf import UrdfDescription, parse_urdf
 from reachmap.cell.model.bodies import BinSpec
 from reachmap.cell.model.cell import Cell, JointValues, ScanConfiguration
+from reachmap.cell.text.yaml_reader import parse_yaml, spelled
 from reachmap.errors import CellError
+
+SUFFIXES = (".yaml", ".yml")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -101,6 +104,23 @@ class LoadedCell:
             name: value if joints[name].type == "prismatic" else math.radians(value)
             for name, value in (given.q_deg or {}).items()
         }
+
+    def place_of(self, key: str) -> str:
+        """Where the cell file gives a key: file, line and column.
+
+        The source alone where the file does not give it, or an override does.
+        """
+        if Path(self.source).suffix not in SUFFIXES or any(
+            change.startswith(key) for change in self.overrides
+        ):
+            return self.source
+        document = parse_yaml(self.text, self.source)
+        places = (
+            str(place)
+            for location, place in document.places.items()
+            if spelled(location, document.data) == key
+        )
+        return next(places, self.source)
 
     def resolve(self, reference: str) -> Path:
         """Absolute path of a file named in the cell file; CellError if none."""

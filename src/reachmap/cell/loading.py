@@ -12,7 +12,7 @@ from reachmap.cell.bins.shorthand import gather_bins, write_out_bins, write_out_
 from reachmap.cell.bins.support import with_bins_on_supports
 from reachmap.cell.files.files import compare_hashes, read_files, stored_files
 from reachmap.cell.files.resources import shipped_folder
-from reachmap.cell.loaded import LoadedCell, fingerprint
+from reachmap.cell.loaded import SUFFIXES, LoadedCell, fingerprint
 from reachmap.cell.model.cell import Cell
 from reachmap.cell.mounting import (
     check_bins_stand,
@@ -45,7 +45,6 @@ __all__ = [
     "stored_cell",
 ]
 
-SUFFIXES = (".yaml", ".yml")
 MAX_JSON_BYTES = 4_000_000
 
 

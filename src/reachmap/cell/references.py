@@ -109,19 +109,24 @@ def _check_body_names(document: Document, robot: UrdfDescription) -> None:
 def _check_bin_names(document: Document, robot: UrdfDescription) -> None:
     """Check that no bin shares its name with something else."""
     taken = {*robot.links, *WORLD, *_body_names(document), "bin"}
-    names = [place[-1] for _, place in bin_places(document.data)[1:]]
-    own = text_at(document.data, "bin", "name")
-    for name in [*names, *([] if own is None else [own])]:
+    for name in _bin_names(document):
         if name in taken:
             message = f"{name!r} is the name of a link, a frame or a body"
             document.add(("bins", name), message, of_key=True)
+
+
+def _bin_names(document: Document) -> list[str]:
+    """Names of the bins, that of the bin to pick from last."""
+    names = [str(place[-1]) for _, place in bin_places(document.data)[1:]]
+    own = text_at(document.data, "bin", "name")
+    return names if own is None else [*names, own]
 
 
 def _check_touch(document: Document, robot: UrdfDescription) -> None:
     bodies = entries(document.data, "bodies")
     names = [text_at(body, "name") or "" for body in bodies]
     places = bin_places(document.data)
-    bins = [label.removeprefix("bin ") for label, _ in places]
+    bins = ["bin", *_bin_names(document)]
     known = [*robot.links, *(name for name in names if name), *bins]
     lists: list[Location] = [("bodies", i, "touch") for i in range(len(bodies))]
     for location in [*lists, *((*place, "touch") for _, place in places)]:

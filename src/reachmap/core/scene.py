@@ -12,7 +12,7 @@ import numpy as np
 
 from reachmap._typing import FloatArray
 from reachmap.cell.model.tool import FREE
-from reachmap.core.collision.bin_fit import BinFit
+from reachmap.core.collision.bin_fit import misplaced_bins
 from reachmap.core.collision.bodies import (
     Load,
     bin_placements,
@@ -36,6 +36,7 @@ logger = logging.getLogger(__name__)
 
 # Distance of the points that a TCP path is measured by.
 TCP_STEP_RAD = 0.02
+SCAN_KEY = "scan_configuration"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -234,11 +235,19 @@ class Scene:
             logger.warning("%s", warning)
         problems = self.scan_problems()
         if problems:
-            source = self.loaded.source
-            raise SceneError(f"{source}: {problem}" for problem in problems)
+            raise SceneError(problems)
 
     def scan_problems(self) -> tuple[str, ...]:
-        """Say why the scan configuration cannot be taken; empty where it can."""
+        """Say why the scan configuration cannot be taken; empty where it can.
+
+        Each problem begins with where the cell file gives what it is about.
+        """
+        return tuple(
+            f"{self.loaded.place_of(key)}: {key}: {problem}"
+            for key, problem in self._problems_by_key()
+        )
+
+    def _problems_by_key(self) -> list[tuple[str, str]]:
         q, robot = self.scan_configuration, self.robot
         problems = []
         for name in robot.outside_limits(q):
@@ -248,20 +257,21 @@ class Scene:
                 float(np.degrees(row[k]) if turns else row[k])
                 for row in (q, robot.lower_rad, robot.upper_rad)
             )
-            problems.append(
-                f"scan_configuration: {name} = {value:.6g} {'deg' if turns else 'm'} "
-                f"is outside its limits [{low:.6g}, {high:.6g}]"
+            text = (
+                f"{name} = {value:.6g} {'deg' if turns else 'm'} is outside its limits "
+                f"[{low:.6g}, {high:.6g}]"
             )
+            problems.append((SCAN_KEY, text))
         for index in self.checker.touching_pairs(q):
             first, second = self.checker.body_pairs[index].split(" | ")
-            problems.append(f"scan_configuration: {first} touches {second}")
+            problems.append((SCAN_KEY, f"{first} touches {second}"))
         # Bodies that stand still are not collision pairs; here they are checked.
         if self.with_bin:
-            fit = BinFit(robot, self.loaded, None, empty=False)
-            contact = fit.contact(self.T_base_bin)
-            if contact is not None:
-                problems.append(f"{self.loaded.cell.bin_key}.pose: {contact.pair}")
-        return tuple(problems)
+            problems += [
+                (f"{key}.pose", contact.pair)
+                for key, contact in misplaced_bins(robot, self.loaded)
+            ]
+        return problems
 
     def tcp_path_points(self, path: FloatArray) -> FloatArray:
         """TCP positions along a joint path, shape (n, 3) [m]."""

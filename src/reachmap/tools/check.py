@@ -70,7 +70,8 @@ class CellCheck:
         Length of the straight approaches, and how deep below the rim the deepest of
         them begins; negative where all begin above it.
     problems : tuple of str
-        Why the scan configuration cannot be taken; empty where it can.
+        Why the scan configuration cannot be taken, and where that is written; empty
+        where it can.
     """
 
     name: str

@@ -9,7 +9,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from reachmap.cell.loading import SUFFIXES, LoadedCell, read_cell, shipped_cells
+from reachmap.cell.loaded import SUFFIXES
+from reachmap.cell.loading import LoadedCell, read_cell, shipped_cells
 from reachmap.errors import SettingsError
 from reachmap.maps.base.record import BasePlacement
 from reachmap.maps.bytes.publish import check_outputs, publish

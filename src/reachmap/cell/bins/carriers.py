@@ -8,7 +8,7 @@ from functools import cache
 from importlib.resources import files
 from typing import Any
 
-from reachmap.cell.bins.shorthand import bin_places
+from reachmap.cell.bins.shorthand import bin_places, stand_in
 from reachmap.cell.text.data import at, text_at
 from reachmap.cell.text.messages import did_you_mean
 from reachmap.cell.text.overrides import is_override
@@ -111,7 +111,7 @@ def write_out_carriers(document: Document) -> None:
         if text_at(document.data, *place, "carrier") is not None:
             _write_out_carrier(document, place)
         elif at(document.data, *place, "carrier") is not None:
-            _stand_in(at(document.data, *place))
+            _give_size(at(document.data, *place))
 
 
 def _write_out_carrier(document: Document, place: Location) -> None:
@@ -126,7 +126,7 @@ def _write_out_carrier(document: Document, place: Location) -> None:
         document.add(
             location, f"no carrier {name!r}; {hint} (`reachmap carriers` lists them)"
         )
-        _stand_in(tray)
+        _give_size(tray)
         return
     tray["carrier"] = carrier.name
     keys = carrier.keys()
@@ -138,7 +138,7 @@ def _write_out_carrier(document: Document, place: Location) -> None:
             tray[key] = keys.get(key)
 
 
-def _stand_in(tray: dict[str, Any]) -> None:
+def _give_size(tray: dict[str, Any]) -> None:
     """Give a bin of unknown carrier some size, so that this is the only mistake."""
     if tray.get("inner") is None:
-        tray["inner"] = [1.0, 1.0, 1.0]
+        tray.update(stand_in())

@@ -7,6 +7,7 @@ levels become the layers of the bin scan.
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from reachmap.cell.text.data import at, text_at
@@ -39,8 +40,7 @@ def write_out_bins(document: Document) -> None:
     data = document.data
     bins, wanted = at(data, "bins"), text_at(data, CHOICE)
     if not isinstance(bins, dict) or not bins:
-        if wanted is not None:
-            document.add((CHOICE,), f"the cell has no bins by name (got {wanted!r})")
+        _without_names(document, wanted)
         return
     names = ", ".join(bins)
     if at(data, "bin") is not None:
@@ -48,6 +48,9 @@ def write_out_bins(document: Document) -> None:
             ("bin",), f"give bin or bins, not both; each is bins.NAME ({names})"
         )
     name = wanted or next(iter(bins))
+    if wanted is None and at(data, CHOICE) is not None:
+        given = at(data, CHOICE)
+        document.add((CHOICE,), f"expected a name in quotes: {names} (got {given!r})")
     if name not in bins:
         document.add((CHOICE,), f"no bin {name!r}; {did_you_mean(name, [*bins])}")
         name = next(iter(bins))
@@ -57,6 +60,24 @@ def write_out_bins(document: Document) -> None:
     data["bin"] = {**own, "name": name} if isinstance(own, dict) else own
     data[CHOICE] = None
     document.move(("bins", name), ("bin",))
+
+
+def _without_names(document: Document, wanted: str | None) -> None:
+    """Judge a cell without bins by name; what is missing for that is told once."""
+    data = document.data
+    if "bins" in data and at(data, "bin") is None:
+        if not data["bins"]:
+            one = "left: {carrier: KLT-4147, pose: …}"
+            document.add(("bins",), f"expected at least one bin by name, as in {one}")
+            data["bins"] = {}
+        data["bin"], data[CHOICE] = stand_in(), None
+    elif wanted is not None:
+        document.add((CHOICE,), f"the cell has no bins by name (got {wanted!r})")
+
+
+def stand_in() -> dict[str, Any]:
+    """Some size for a bin that has none, so that this is the only mistake."""
+    return {"inner": [1.0, 1.0, 1.0]}
 
 
 def bin_places(data: Any) -> list[tuple[str, Location]]:
@@ -88,8 +109,9 @@ def write_out_fill(document: Document) -> None:
         return
     heights = [round(v * depth if key == "fill" else v, 6) + 0.0 for v in values]
     if heights[-1] > depth:
+        level = f"{heights[-1]:g} m"
         document.add(
-            (SECTION, key), f"the bin is {depth:g} deep (got a level of {heights[-1]})"
+            (SECTION, key), f"the bin is {depth:g} m deep (got a level of {level})"
         )
         return
     place = (SECTION, "layers")
@@ -104,7 +126,7 @@ def _numbers(values: Any) -> list[float] | None:
         return None
     if any(isinstance(v, bool) or not isinstance(v, int | float) for v in values):
         return None
-    return values
+    return values if all(map(math.isfinite, values)) else None
 
 
 def _depth(document: Document) -> float | None:

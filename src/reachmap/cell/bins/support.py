@@ -10,6 +10,7 @@ from reachmap._typing import FloatArray
 from reachmap.cell.model.bodies import BinSpec, BodySpec
 from reachmap.cell.model.cell import Cell
 from reachmap.cell.model.shapes import triangles_of
+from reachmap.cell.text.messages import did_you_mean
 from reachmap.cell.text.yaml_reader import Document, Location
 from reachmap.geometry import inverse_transform, tilt_rad
 
@@ -123,6 +124,17 @@ def with_bins_on_supports(document: Document, cell: Cell) -> Cell:
     return cell
 
 
+def _no_support(cell: Cell, name: str, faces: tuple[TopFace, ...]) -> str:
+    """Why a bin cannot stand on something of that name."""
+    known = [face.name for face in faces]
+    if name not in [body.name for body in cell.bodies]:
+        return f"no body {name!r}; {did_you_mean(name, known)}"
+    return (
+        f"{name!r} has no level top face, or is not attached to world or robot_base "
+        f"(bodies that are and have one: {', '.join(known) or 'none'})"
+    )
+
+
 def _on_support(
     document: Document, cell: Cell, spec: BinSpec, where: Location
 ) -> FloatArray | None:
@@ -132,20 +144,23 @@ def _on_support(
     every, name = top_faces(cell, np.eye(4)), spec.on
     faces = [face for face in every if face.name == name]
     if not faces:
-        known = ", ".join(face.name for face in every) or "none"
+        document.add(where, _no_support(cell, str(name), every))
+        return None
+    tilt_deg = np.degrees(tilt_rad(T_world_bin[:3, :3]))
+    if tilt_deg > STEADY_DEG:
         document.add(
             where,
-            f"{name!r} is not a body with a level top face, attached to world or "
-            f"robot_base (those are: {known})",
+            f"the bin leans by {tilt_deg:.3g} deg, so it cannot stand flat on "
+            f"{name!r}; leave out on, or the lean in pose",
         )
-        return None
-    if np.degrees(tilt_rad(T_world_bin[:3, :3])) > STEADY_DEG:
-        document.add(where, f"the bin is tilted, so it cannot stand flat on {name!r}")
         return None
     over = faces[0].overhang_m(footprint_of_bin(spec, T_world_bin))
     if over > SLACK_M:
+        x, y, _ = spec.outer
         document.add(
-            where, f"the bin hangs {1e3 * over:.0f} mm over the edge of {name!r}"
+            where,
+            f"the bin, {x:g} x {y:g} m outside, hangs {1e3 * over:.0f} mm over the "
+            f"edge of {name!r}; move or turn it in pose",
         )
         return None
     T_world_bin[2, 3] = faces[0].z + spec.bottom_m

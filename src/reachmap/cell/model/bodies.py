@@ -154,7 +154,8 @@ class BinSpec(Record):
         depth = self.inner[2]
         if self.heap > depth:
             raise ValueError(
-                f"heap must lie in the bin, which is {depth:g} deep (got {self.heap:g})"
+                f"heap must lie in the bin, which is {depth:g} m deep "
+                f"(got {self.heap:g} m)"
             )
         if self.rim is not None and self.rim.height > depth + self.bottom_m:
             raise ValueError(

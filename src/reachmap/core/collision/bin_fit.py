@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -86,6 +86,8 @@ class BinFit:
     empty : bool
         Whether what stands still may not be inside the bin either; a divider may,
         as long as it does not reach into walls or bottom.
+    name : str, optional
+        Which of the other bins to check, in place of the one to pick from.
     """
 
     def __init__(
@@ -95,21 +97,25 @@ class BinFit:
         q: FloatArray | None,
         *,
         empty: bool = True,
+        name: str | None = None,
     ) -> None:
-        geometry = build_geometry(robot, loaded, with_bin=False)
+        others = {n: spec for n, spec in loaded.cell.bins.items() if n != name}
+        beside = loaded.with_other_bins(others)
+        geometry = build_geometry(robot, beside, with_bin=False)
         bodies = bodies_at(robot, geometry, np.zeros(robot.dof) if q is None else q)
-        parts = parts_of_bin(loaded)
+        parts = parts_of_bin(loaded, name)
+        allowed = _Touches(loaded, name)
         # A little smaller, so that standing on a table is not a collision.
         still_parts = [_part(part, CONTACT_M) for part in parts]
         if empty:
             still_parts.append(_part(_around(parts), CONTACT_M))
         still = PlacedBodies(b for b in bodies if b.joint == ROOT)
-        self._groups = [_Group(still, still_parts, loaded)]
+        self._groups = [_Group(still, still_parts, allowed)]
         if q is not None:
             margin_m = loaded.cell.collision.safety_margin_m
             arm = PlacedBodies((b for b in bodies if b.joint != ROOT), margin_m)
             self._groups.append(
-                _Group(arm, [_part(part, 0.0) for part in parts], loaded)
+                _Group(arm, [_part(part, 0.0) for part in parts], allowed)
             )
 
     def contact(self, T_base_bin: FloatArray) -> BinContact | None:
@@ -122,6 +128,27 @@ class BinFit:
                     part=part, other=body.name, at_scan=body.joint != ROOT
                 )
         return None
+
+
+def misplaced_bins(
+    robot: RobotModel, loaded: LoadedCell
+) -> Iterator[tuple[str, BinContact]]:
+    """Key of each bin that reaches into what stands still, and what it meets first.
+
+    Two bins that reach into each other are told once.
+    """
+    cell = loaded.cell
+    contact = BinFit(robot, loaded, None, empty=False).contact(cell.T_base_bin())
+    if contact is not None:
+        yield cell.bin_key, contact
+    rest = dict(cell.bins)
+    for name, spec in cell.bins.items():
+        beside = loaded.with_other_bins(rest)
+        fit = BinFit(robot, beside, None, empty=False, name=name)
+        contact = fit.contact(cell.T_base_of(spec))
+        if contact is not None:
+            yield f"bins.{name}", contact
+        del rest[name]
 
 
 class ToolFit:
@@ -205,14 +232,20 @@ class ToolFit:
 class _Touches:
     """Which contacts with the bin the cell allows."""
 
-    def __init__(self, loaded: LoadedCell) -> None:
-        self._of_bin = set(loaded.cell.bin.touch)
-        self._of_body = {b.name: set(b.touch) for b in loaded.cell.bodies}
+    def __init__(self, loaded: LoadedCell, name: str | None = None) -> None:
+        cell = loaded.cell
+        spec = cell.bin if name is None else cell.bins[name]
+        self._of_bin = set(spec.touch)
+        self._names = {WHOLE, name or spec.name or WHOLE}
+        self._others = {n: set(s.touch) for n, s in cell.bins.items()}
+        self._of_body = {b.name: set(b.touch) for b in cell.bodies}
 
     def __call__(self, part: str, other: str) -> bool:
-        return other in self._of_bin or bool(
-            self._of_body.get(other, set()) & {WHOLE, part}
-        )
+        # A part of another bin: what the cell says of that bin, or of all, counts.
+        owner = next((n for n in self._others if other.startswith(f"{n} bin ")), "")
+        theirs = self._others.get(owner) or self._of_body.get(other, set())
+        named = {owner, WHOLE} if owner else {other}
+        return bool(self._of_bin & named or theirs & (self._names | {part}))
 
 
 Part = tuple[str, Any, FloatArray]
@@ -222,10 +255,9 @@ class _Group:
     """Bodies with the shapes of the bin that must not touch them."""
 
     def __init__(
-        self, placed: PlacedBodies, parts: list[Part], loaded: LoadedCell
+        self, placed: PlacedBodies, parts: list[Part], allowed: _Touches
     ) -> None:
-        self._placed, self._parts = placed, parts
-        self._allowed = _Touches(loaded)
+        self._placed, self._parts, self._allowed = placed, parts, allowed
         boxes = [box_around(shape, _at(centre)) for _, shape, centre in parts]
         self._low = np.min([low for low, _ in boxes], axis=0)
         self._high = np.max([high for _, high in boxes], axis=0)

@@ -29,7 +29,6 @@ from reachmap.cell.pick_cycle import PART
 from reachmap.core.collision.held_part import HeldPart
 from reachmap.core.collision.shapes import coal_shape
 from reachmap.core.robot.model import RobotModel
-from reachmap.core.robot.urdf_joints import LINK_MARK
 from reachmap.errors import SceneError
 from reachmap.geometry import transform_from_parts
 
@@ -67,14 +66,16 @@ class BodyGeometry:
         )
 
 
-def parts_of_bin(loaded: LoadedCell) -> tuple[BinPart, ...]:
-    """Parts of a cell's bin, its mesh read where it has one.
+def parts_of_bin(loaded: LoadedCell, name: str | None = None) -> tuple[BinPart, ...]:
+    """Parts of a cell's bin, or of another by name, its mesh read where it has one.
 
     Raises
     ------
     SceneError
         The mesh cannot be read.
     """
+    if name is not None:
+        return _parts_of(loaded, loaded.cell.bins[name], f"bin {name}")
     return _parts_of(loaded, loaded.cell.bin, "bin")
 
 
@@ -168,7 +169,7 @@ def build_geometry(
             builder.add(f"{name} {part.name}", ROOT, T, part.shape)
     touches = [(body.name, body.touch) for body in loaded.cell.bodies]
     touches += [(name, spec.touch) for name, spec in loaded.cell.bins.items()]
-    builder.others = tuple(loaded.cell.bins)
+    builder.own, builder.others = loaded.cell.bin.name, tuple(loaded.cell.bins)
     if with_bin:
         touches.append(("bin", loaded.cell.bin.touch))
     if held is not None:
@@ -262,6 +263,8 @@ class _Builder:
         self.geometry = pin.GeometryModel()
         self.names: list[str] = []
         self.shapes: list[Solid] = []
+        # Names of the bin to pick from and of the other bins.
+        self.own: str | None = None
         self.others: tuple[str, ...] = ()
 
     def add(
@@ -293,19 +296,9 @@ class _Builder:
     ) -> None:
         """Take out the pairs that may touch.
 
-        ``bin`` stands for the parts of all bins, the name of another for its own.
+        ``bin`` stands for the parts of all bins, a bin's name for its own. What is
+        not in this scene, such as a bin that was left out, allows nothing.
         """
-        model = self.robot.body_model
-        links = {f.name.removesuffix(LINK_MARK) for f in model.frames}
-        known = {*self.names, *self.others, *links, "world", "robot_base", "bin"}
-        problems = [
-            f"body {body!r}: touch names {other!r}, which is neither a link nor a body"
-            for body, others in touches
-            for other in others
-            if other not in known
-        ]
-        if problems:
-            raise SceneError(problems)
         self.remove(
             pair
             for body, others in touches
@@ -326,10 +319,11 @@ class _Builder:
         def parts(name: str) -> list[str]:
             if name in self.others:
                 return [n for n in self.names if n.startswith(f"{name} bin ")]
-            if name != "bin":
+            if name not in ("bin", self.own):
                 return [name]
             own = [n for n in self.names if with_bin and n.startswith("bin ")]
-            return own + [n for other in self.others for n in parts(other)]
+            others = self.others if name == "bin" else ()
+            return own + [n for other in others for n in parts(other)]
 
         for first in parts(a):
             for second in parts(b):
