@@ -12,7 +12,7 @@ __all__ = ["group", "main"]
 
 
 def main() -> NoReturn:
-    """Run the command line and exit with the code of the table in ``failures``."""
+    """Run the command line and exit with the code of the table in ``diagnostics``."""
     prepare_streams()
     # Pictures are drawn to files; a notebook's backend may not even be installed here.
     os.environ["MPLBACKEND"] = "agg"

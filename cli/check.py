@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from reachmap.cli.failures import RunState
+from reachmap.cli.diagnostics import RunState
 from reachmap.cli.options import cell_argument, json_option, set_option
 from reachmap.cli.terminal import print_answer
 

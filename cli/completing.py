@@ -5,7 +5,7 @@ from __future__ import annotations
 import click
 from click.shell_completion import CompletionItem
 
-from reachmap.cli.verbosity import ARGUMENTS
+from reachmap.cli.diagnostics import ARGUMENTS
 
 DEFAULT_CELL = "ur5-eye-in-hand"
 

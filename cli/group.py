@@ -15,10 +15,12 @@ from typing import Any
 import click
 from click.shell_completion import CompletionItem
 
-from reachmap.cli.failures import PipeClosedError, RunState, exit_code_of
-from reachmap.cli.verbosity import (
+from reachmap.cli.diagnostics import (
     ARGUMENTS,
+    PipeClosedError,
+    RunState,
     configure_logging,
+    exit_code_of,
     show_version,
     verbosity_parameters,
 )
@@ -150,9 +152,11 @@ def _named_arguments() -> Iterator[None]:
         yield
     except click.NoSuchOption as error:
         context, asked = error.ctx, error.option_name.lstrip("-")
-        for one in context.command.params if context else ():
+        if context is None:
+            raise
+        for one in context.command.params:
             name = (one.metavar or one.name or "").strip("[].").lower()
-            if context and isinstance(one, click.Argument) and name == asked:
+            if isinstance(one, click.Argument) and name == asked:
                 raise click.UsageError(
                     f"No such option {error.option_name!r}: {asked} is an argument, "
                     f"as in `{context.command_path} {asked.upper()}`.",

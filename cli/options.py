@@ -40,7 +40,7 @@ import click
 from click.core import ParameterSource
 
 from reachmap.cli.completing import DEFAULT_CELL, complete_cells, complete_keys
-from reachmap.cli.failures import RunState
+from reachmap.cli.diagnostics import RunState
 from reachmap.runtime.options import RunOptions, available_cores
 
 Decorated = TypeVar("Decorated", bound=Callable[..., Any])

@@ -8,7 +8,6 @@ NO_COLOR removes the colours.
 from __future__ import annotations
 
 import json
-import os
 import re
 import sys
 from collections.abc import Callable, Mapping
@@ -59,14 +58,6 @@ def facts_text(facts: Mapping[str, object]) -> str:
 def _show(text: str) -> None:
     if not (is_terminal(sys.stdout) and _show_styled(text)):
         click.echo(text)
-
-
-def program_name(colour: str | None = None) -> str:
-    """First word of messages on stderr, coloured where the terminal supports it."""
-    name = "reachmap:"
-    if colour is None or os.environ.get("NO_COLOR") or not is_terminal(sys.stderr):
-        return name
-    return click.style(name, fg=colour, bold=True)
 
 
 def _show_styled(text: str) -> bool:

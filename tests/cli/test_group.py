@@ -244,7 +244,7 @@ def test_help_imports_no_engine() -> None:
     output = subprocess.run(
         [sys.executable, "-c", script], capture_output=True, text=True, check=True
     ).stdout.splitlines()
-    frame = ["failures", "group", "streams", "terminal", "verbosity"]
+    frame = ["diagnostics", "group", "streams"]
     assert output[-2] == "[]"
     assert output[-1] == str([f"reachmap.cli.{name}" for name in frame])
     for name in AVAILABLE:

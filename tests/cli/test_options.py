@@ -10,8 +10,7 @@ import pytest
 from click.testing import CliRunner
 
 from reachmap.cli import options
-from reachmap.cli.failures import RunState
-from reachmap.cli.verbosity import verbosity_parameters
+from reachmap.cli.diagnostics import RunState, verbosity_parameters
 
 
 def run(command: click.Command, *arguments: str, **env: str) -> str:

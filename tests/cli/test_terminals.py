@@ -23,7 +23,7 @@ STAGE = (
     "-c",
     "import logging\n"
     "from reachmap.cli.streams import prepare_streams\n"
-    "from reachmap.cli.verbosity import configure_logging\n"
+    "from reachmap.cli.diagnostics import configure_logging\n"
     "from reachmap.runtime.progress import Progress\n"
     "prepare_streams()\n"
     "configure_logging(0)\n"

@@ -1,4 +1,6 @@
-"""How a command line ends: the one place where errors become lines and exit codes.
+"""What goes to stderr: the log as ``-v`` and ``-q`` ask, and how a command line ends.
+
+This is the one place where errors become lines and exit codes:
 
 ===== ==========================================================================
 Code  Meaning
@@ -15,6 +17,9 @@ Code  Meaning
 
 from __future__ import annotations
 
+import logging
+import os
+import re
 import sys
 import traceback
 from collections.abc import Callable, Iterable
@@ -23,13 +28,21 @@ from typing import Any
 
 import click
 
+from reachmap import __version__
 from reachmap.cli.streams import AnswerError, discard_stdout
-from reachmap.cli.terminal import program_name
 from reachmap.errors import MissingExtraError, OutputError, ReachmapError
+from reachmap.text import is_terminal
 
 INTERNAL_ERROR = 70
 INTERRUPTED = 130
 PIPE_CLOSED = 141
+
+LEVELS = (logging.ERROR, logging.WARNING, logging.INFO, logging.DEBUG)
+COLOURS = {logging.WARNING: "yellow", logging.ERROR: "red"}
+NORMAL = LEVELS.index(logging.WARNING)
+ARGUMENTS = "reachmap.arguments"
+"""Context key of the command line's words: --version may precede -v."""
+ENGINES_WANTED = re.compile(r"-v+|--verbose")
 
 
 class PipeClosedError(Exception):
@@ -42,6 +55,14 @@ class RunState:
 
     debug: bool = False
     verbosity: int = 0
+
+
+def program_name(colour: str | None = None) -> str:
+    """First word of every line, coloured where the terminal supports it."""
+    name = "reachmap:"
+    if colour is None or os.environ.get("NO_COLOR") or not is_terminal(sys.stderr):
+        return name
+    return click.style(name, fg=colour, bold=True)
 
 
 def exit_code_of(run: Callable[[], Any], state: RunState) -> int:
@@ -122,3 +143,80 @@ def _interrupted(error: BaseException) -> int:
     message = str(cause or "").strip() or "interrupted"
     _print_errors(message.splitlines())
     return INTERRUPTED
+
+
+class _StderrHandler(logging.StreamHandler):  # type: ignore[type-arg]
+    """Writes to whatever ``sys.stderr`` is at the time of writing."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Follow a stderr that was replaced since the handler was made."""
+        self.stream = sys.stderr
+        super().emit(record)
+
+    def format(self, record: logging.LogRecord) -> str:
+        """Prefix the name of the program, in the colour of the level."""
+        return f"{program_name(COLOURS.get(record.levelno))} {super().format(record)}"
+
+
+def configure_logging(verbosity: int) -> None:
+    """Send the package's log to stderr; 0 shows warnings, higher values more."""
+    logger = logging.getLogger("reachmap")
+    logger.setLevel(LEVELS[min(max(NORMAL + verbosity, 0), len(LEVELS) - 1)])
+    if not any(isinstance(handler, _StderrHandler) for handler in logger.handlers):
+        logger.addHandler(_StderrHandler())
+
+
+def _count(ctx: click.Context, parameter: click.Parameter, value: int) -> None:
+    state = ctx.find_root().obj
+    if isinstance(state, RunState) and value:
+        state.verbosity += value if parameter.name == "verbose" else -value
+        configure_logging(state.verbosity)
+
+
+def _debug(ctx: click.Context, parameter: click.Parameter, value: bool) -> None:
+    state = ctx.find_root().obj
+    if isinstance(state, RunState) and value:
+        state.debug = True
+
+
+def show_version(ctx: click.Context, parameter: click.Parameter, value: bool) -> None:
+    """Print the version and exit; with ``-v`` anywhere, also those of the engines."""
+    if not value or ctx.resilient_parsing:
+        return
+    click.echo(f"reachmap {__version__}")
+    if any(ENGINES_WANTED.fullmatch(word) for word in ctx.meta.get(ARGUMENTS, ())):
+        # Imported here: a bare version needs no NumPy.
+        from reachmap.maps.provenance import package_versions
+
+        for name, version in package_versions().items():
+            click.echo(f"{name} {version}")
+    ctx.exit()
+
+
+def verbosity_parameters() -> list[click.Parameter]:
+    """Fresh ``-v``, ``-q`` and ``--debug`` that no command has to receive."""
+    return [
+        click.Option(
+            ["-v", "--verbose"],
+            count=True,
+            expose_value=False,
+            is_eager=True,
+            callback=_count,
+            help="Log more on stderr; -vv logs most.",
+        ),
+        click.Option(
+            ["-q", "--quiet"],
+            count=True,
+            expose_value=False,
+            is_eager=True,
+            callback=_count,
+            help="Log less on stderr.",
+        ),
+        click.Option(
+            ["--debug"],
+            is_flag=True,
+            expose_value=False,
+            callback=_debug,
+            help="Show the traceback of an error.",
+        ),
+    ]
