@@ -134,8 +134,8 @@ def grasps(data: bytes, folder: Path) -> None:
 
 def hdf5(data: bytes, folder: Path) -> None:
     """An artefact: as it is, and with a seal that fits."""
-    from reachmap.maps.bytes.hashing import seal, unseal
     from reachmap.maps.format.registry import read_artefact
+    from reachmap.maps.format.store import seal, unseal
 
     path = folder / "map.h5"
     image = unseal(data)[0]

@@ -13,9 +13,8 @@ from reachmap.maps import RunClock, collect_provenance
 from reachmap.maps.provenance import (
     package_versions,
     provenance_from_texts,
-    provenance_texts,
+    record_texts,
     run_from_texts,
-    run_texts,
 )
 from tests.support.synthetic_maps import synthetic_provenance, synthetic_run
 
@@ -76,8 +75,8 @@ def test_everything_of_a_loaded_cell_is_kept() -> None:
 def test_texts_and_records_turn_into_each_other() -> None:
     """The texts of the two groups hold everything of the two records."""
     provenance, run = synthetic_provenance(), synthetic_run()
-    assert provenance_from_texts(provenance_texts(provenance), "file") == provenance
-    assert run_from_texts(run_texts(run), "file") == run
+    assert provenance_from_texts(record_texts(provenance), "file") == provenance
+    assert run_from_texts(record_texts(run), "file") == run
 
 
 @pytest.mark.parametrize(

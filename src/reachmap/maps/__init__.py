@@ -6,8 +6,8 @@ its bytes up to the consistency of its numbers.
 
 from __future__ import annotations
 
-from reachmap.maps.bytes.hashing import canonical_json, config_sha256
 from reachmap.maps.bytes.publish import check_output, check_outputs, publish
+from reachmap.maps.bytes.to_json import canonical_json, config_sha256
 from reachmap.maps.format.bin import read_bin_map, write_bin_map
 from reachmap.maps.format.placement import read_placement, write_placement
 from reachmap.maps.format.registry import read_provenance

@@ -9,10 +9,11 @@ import socket
 import sys
 import time
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import fields
 from datetime import datetime
 from functools import lru_cache
 from importlib import metadata
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from reachmap.disk import recorded_name
 from reachmap.errors import MapFileError
@@ -29,6 +30,11 @@ PACKAGES = (
 """Distributions whose versions are recorded."""
 
 MAX_DEPTH = 32
+_JSON: Final[Mapping[str, type]] = {
+    "overrides": list,
+    **dict.fromkeys(("files_sha256", "packages", "settings", "wall_s", "cpu_s"), dict),
+}
+"""Fields that are stored as JSON texts, and what they are."""
 
 
 def package_versions(names: Sequence[str] = PACKAGES) -> dict[str, str]:
@@ -123,74 +129,50 @@ def _now() -> str:
     return datetime.now().astimezone().isoformat(timespec="seconds")
 
 
-def provenance_texts(provenance: Provenance) -> dict[str, str]:
-    """Write a record as the texts of ``/provenance``."""
+def record_texts(record: Provenance | RunInfo) -> dict[str, str]:
+    """Write a record as the texts of ``/provenance`` or ``/run``."""
+    values = ((item.name, getattr(record, item.name)) for item in fields(record))
     return {
-        "cell_yaml": provenance.cell_yaml,
-        "cell_resolved_json": provenance.cell_resolved_json,
-        "overrides_json": _json_text(provenance.overrides),
-        "urdf": provenance.urdf,
-        "srdf": provenance.srdf,
-        "files_sha256_json": _json_text(provenance.files_sha256),
-        "packages_json": _json_text(provenance.packages),
-        "settings_json": _json_text(provenance.settings),
-        "source_sha256": provenance.source_sha256,
+        f"{name}_json" if name in _JSON else name: (
+            # In the order of the keys, as phases of a run have one.
+            json.dumps(plain(value), ensure_ascii=False)
+            if name in _JSON
+            else str(value)
+        )
+        for name, value in values
     }
 
 
 def provenance_from_texts(texts: Mapping[str, str], where: str) -> Provenance:
     """Parse the texts of ``/provenance``; MapFileError if they are not."""
-    return Provenance(
-        cell_yaml=texts.get("cell_yaml", ""),
-        cell_resolved_json=texts.get("cell_resolved_json", ""),
-        overrides=_texts(_json(texts, "overrides_json", where, list), where),
-        urdf=texts.get("urdf", ""),
-        srdf=texts.get("srdf", ""),
-        files_sha256=_json(texts, "files_sha256_json", where, dict),
-        packages=_json(texts, "packages_json", where, dict),
-        settings=_json(texts, "settings_json", where, dict),
-        source_sha256=texts.get("source_sha256", ""),
-    )
-
-
-def run_texts(run: RunInfo) -> dict[str, str]:
-    """Write a record as the texts of ``/run``."""
-    return {
-        "started": run.started,
-        "finished": run.finished,
-        "host": run.host,
-        "command_line": run.command_line,
-        "workers": str(run.workers),
-        "wall_s_json": _json_text(run.wall_s),
-        "cpu_s_json": _json_text(run.cpu_s),
-    }
+    values = _values(Provenance, texts, where)
+    return Provenance(**{**values, "overrides": _texts(values["overrides"], where)})
 
 
 def run_from_texts(texts: Mapping[str, str], where: str) -> RunInfo:
     """Parse the texts of ``/run``; MapFileError if they are not."""
-    workers = texts.get("workers", "1")
+    values = _values(RunInfo, texts, where)
+    workers = values["workers"] or "1"
     if not (workers.isdecimal() and len(workers) < 10):
         raise MapFileError(f"{where}: run/workers is not a number (got {workers!r})")
-    return RunInfo(
-        started=texts.get("started", ""),
-        finished=texts.get("finished", ""),
-        host=texts.get("host", ""),
-        command_line=texts.get("command_line", ""),
-        workers=int(workers),
-        wall_s=_json(texts, "wall_s_json", where, dict),
-        cpu_s=_json(texts, "cpu_s_json", where, dict),
-    )
+    return RunInfo(**{**values, "workers": int(workers)})
+
+
+def _values(
+    kind: type[Provenance | RunInfo], texts: Mapping[str, str], where: str
+) -> dict[str, Any]:
+    return {
+        item.name: _json(texts, f"{item.name}_json", where, _JSON[item.name])
+        if item.name in _JSON
+        else texts.get(item.name, "")
+        for item in fields(kind)
+    }
 
 
 def _texts(values: list[Any], where: str) -> tuple[str, ...]:
     if not all(isinstance(value, str) for value in values):
         raise MapFileError(f"{where}: overrides_json is not a list of texts")
     return tuple(values)
-
-
-def _json_text(value: Any) -> str:
-    """Write JSON that keeps the order of keys, as phases of a run have one."""
-    return json.dumps(plain(value), ensure_ascii=False)
 
 
 def _json(texts: Mapping[str, str], name: str, where: str, kind: type) -> Any:

@@ -22,8 +22,8 @@ from reachmap.maps import (
     write_workspace_map,
 )
 from reachmap.maps.bytes import isolation
-from reachmap.maps.bytes.hashing import SEAL_BYTES, seal, unseal
 from reachmap.maps.bytes.hdf5 import StructureError
+from reachmap.maps.format.store import SEAL_BYTES, seal, unseal
 from tests.support.map_asserts import assert_records_equal
 from tests.support.synthetic_maps import (
     synthetic_bin_map,

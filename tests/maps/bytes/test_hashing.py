@@ -9,12 +9,13 @@ import numpy as np
 import pytest
 
 from reachmap.maps import canonical_json, config_sha256
-from reachmap.maps.bytes.hashing import (
+from reachmap.maps.bytes.tree import (
+    Leaf,
+    Tree,
     canonical_array,
     content_sha256,
     integrity_sha256,
 )
-from reachmap.maps.bytes.tree import Leaf, Tree
 from reachmap.maps.format.placement import tree_from_placement
 from reachmap.maps.format.workspace import tree_from_workspace_map
 from tests.support.synthetic_maps import synthetic_placement, synthetic_workspace_map

@@ -22,15 +22,10 @@ from reachmap.maps import (
     write_workspace_map,
 )
 from reachmap.maps.bytes import isolation
-from reachmap.maps.bytes.hashing import (
-    SEAL_BYTES,
-    content_sha256,
-    integrity_sha256,
-    seal,
-)
 from reachmap.maps.bytes.hdf5 import image_from_tree
-from reachmap.maps.bytes.tree import Tree
+from reachmap.maps.bytes.tree import Tree, content_sha256, integrity_sha256
 from reachmap.maps.format import bin as bin_format
+from reachmap.maps.format.store import SEAL_BYTES, seal
 from tests.support.synthetic_maps import (
     synthetic_bin_map,
     synthetic_placement,

@@ -1,7 +1,8 @@
-"""Values as JSON: plain, readable, and flattened to named leaves."""
+"""Values as JSON: plain, readable, flattened to named leaves; hashed as one text."""
 
 from __future__ import annotations
 
+import hashlib
 import json
 import math
 from collections.abc import Iterator, Mapping
@@ -66,3 +67,56 @@ def flat_json(value: Any, prefix: str = "") -> Iterator[tuple[str, str]]:
             yield from flat_json(item, f"{prefix}{place}")
     else:
         yield prefix, json.dumps(value)
+
+
+def canonical_json(value: Any) -> str:
+    """Write a value as the one JSON text for it: keys sorted, no spaces, no NaN.
+
+    Examples
+    --------
+    >>> canonical_json({"b": (1, 2.5), "a": "é"})
+    '{"a":"é","b":[1,2.5]}'
+    """
+    return json.dumps(
+        plain(value),
+        sort_keys=True,
+        separators=(",", ":"),
+        ensure_ascii=False,
+        allow_nan=False,
+    )
+
+
+def config_sha256(
+    *,
+    kind: str,
+    cell_sha256: str,
+    seed: int,
+    settings: Mapping[str, Any],
+    method: str = "",
+    source_sha256: str = "",
+) -> str:
+    """Hash of everything that determines a result.
+
+    Parameters
+    ----------
+    kind : str
+        What is made, as in ``"bin_map"``.
+    cell_sha256 : str
+        Of the cell's contents, not of paths on one machine.
+    seed : int
+    settings : mapping
+        Whatever else the result depends on: repeats, planner, checking. Never the
+        number of workers, names of files or limits on time.
+    method : str
+    source_sha256 : str
+        ``content_sha256`` of the artefact this one is made from.
+    """
+    facts = {
+        "kind": kind,
+        "cell_sha256": cell_sha256,
+        "seed": seed,
+        "settings": settings,
+        "method": method,
+        "source_sha256": source_sha256,
+    }
+    return hashlib.sha256(canonical_json(facts).encode()).hexdigest()

@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 
 from reachmap.errors import EngineError
-from reachmap.maps.bytes.hashing import content_sha256, integrity_sha256
-from reachmap.maps.bytes.tree import Array, Leaf, Tree
+from reachmap.maps.bytes.tree import Array, Leaf, Tree, content_sha256, integrity_sha256
 from reachmap.maps.format.layout import (
     FORMAT_VERSION,
     PROVENANCE_TEXTS,
@@ -21,9 +20,8 @@ from reachmap.maps.format.layout import (
 )
 from reachmap.maps.provenance import (
     provenance_from_texts,
-    provenance_texts,
+    record_texts,
     run_from_texts,
-    run_texts,
 )
 from reachmap.maps.records import Provenance, RunInfo, Stamp
 
@@ -119,8 +117,8 @@ def assemble(
         )
         tree.leaves[variable.path] = leaf
     tree.leaves.update({k: Leaf(value=text) for k, text in (texts or {}).items()})
-    _add_texts(tree, "provenance", provenance_texts(provenance))
-    _add_texts(tree, "run", run_texts(run))
+    _add_texts(tree, "provenance", record_texts(provenance))
+    _add_texts(tree, "run", record_texts(run))
     tree.attributes["content_sha256"] = content_sha256(tree)
     tree.attributes["integrity_sha256"] = integrity_sha256(tree)
     return tree

@@ -1,8 +1,16 @@
-"""Artefacts on disk: written whole or not at all, read checked or not at all."""
+"""Artefacts on disk: written whole or not at all, read checked or not at all.
+
+The seal is a checksum of the bytes, appended to the HDF5 data. The HDF5 library trusts
+what it reads: on a file with a few flipped bits it can loop for ever. So no artefact is
+handed to it before its bytes have been compared with the seal. Readers of HDF5 ignore
+what follows the end of the file that the superblock names; a program that opens the
+file for writing cuts the seal off.
+"""
 
 from __future__ import annotations
 
 import dataclasses
+import hashlib
 import re
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -12,7 +20,6 @@ import numpy as np
 
 from reachmap.disk import read_up_to
 from reachmap.errors import EngineError, MapFileError, ReachmapError
-from reachmap.maps.bytes.hashing import content_sha256, integrity_sha256, seal, unseal
 from reachmap.maps.bytes.hdf5 import (
     MAX_BYTES,
     StructureError,
@@ -27,7 +34,7 @@ from reachmap.maps.bytes.isolation import (
     named_size,
 )
 from reachmap.maps.bytes.publish import publish, reason_of
-from reachmap.maps.bytes.tree import Leaf, Tree
+from reachmap.maps.bytes.tree import Leaf, Tree, content_sha256, integrity_sha256
 from reachmap.maps.format.checks import check_ranges, check_structure
 from reachmap.maps.format.layout import (
     FORMAT_VERSION,
@@ -42,6 +49,10 @@ OPEN_ELSEWHERE = (
 )
 MAX_PROBLEMS = 8
 """Mistakes of one file that are listed before the rest is only counted."""
+
+_PREFIX = b"\nreachmap-seal sha256 "
+_PATTERN = re.compile(re.escape(_PREFIX) + rb"([0-9a-f]{64})\n\Z")
+SEAL_BYTES = len(_PREFIX) + 65
 
 Record = TypeVar("Record")
 
@@ -332,3 +343,24 @@ def _listed(problems: list[str]) -> list[str]:
     shown = problems[:MAX_PROBLEMS]
     rest = len(problems) - len(shown)
     return [*shown, f"and {rest} more mistakes"] if rest else shown
+
+
+def seal(image: bytes) -> bytes:
+    """Make the line that is written behind an HDF5 image."""
+    return _PREFIX + hashlib.sha256(image).hexdigest().encode() + b"\n"
+
+
+def unseal(data: bytes) -> tuple[bytes, bool | None]:
+    """Split a file into its HDF5 image and the verdict of its seal.
+
+    Returns
+    -------
+    image : bytes
+    intact : bool or None
+        Whether the seal fits the image; None where there is no seal.
+    """
+    found = _PATTERN.search(data, max(0, len(data) - SEAL_BYTES))
+    if found is None:
+        return data, None
+    image = data[: found.start()]
+    return image, hashlib.sha256(image).hexdigest().encode() == found.group(1)

@@ -16,7 +16,7 @@ from reachmap.geometry import (
     inverse_transform,
     rotation_from_quaternion_wxyz,
 )
-from reachmap.maps.bytes.hashing import canonical_array
+from reachmap.maps.bytes.tree import canonical_array
 from reachmap.maps.parts import freeze
 from reachmap.maps.records import BinMap, Status
 from reachmap.ranking.lookup.settings import QUANTILE, CostBasis
