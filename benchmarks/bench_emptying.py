@@ -23,7 +23,7 @@ from reachmap.maps import BinMap, read_bin_map
 from reachmap.maps.provenance import cell_of_artefact
 from reachmap.picking.emptying import Fate, empty_heap
 from reachmap.picking.heap import Heap, drop_heap
-from reachmap.ranking.lookup.approach import complete_rotation
+from reachmap.ranking.lookup.queries import complete_rotation
 from reachmap.ranking.lookup.ranker import Ranker
 from reachmap.sampling.frames import approach_distance_m
 from reachmap.scans.ik_survey import survey_frames

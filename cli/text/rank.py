@@ -10,7 +10,7 @@ from reachmap._typing import FloatArray
 from reachmap.cli.text.cycle import throughput_text
 from reachmap.maps.cycle.seconds import TO_GRASP, throughput_of
 from reachmap.ranking.answers.ranked_list import RankedList, quadrant_ranks
-from reachmap.ranking.lookup.order import status_name
+from reachmap.ranking.lookup.costs import status_name
 from reachmap.ranking.lookup.table import TERMS
 from reachmap.ranking.terms import FAILURE, PLANNING
 from reachmap.text import printable

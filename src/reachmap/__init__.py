@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from reachmap.maps.format.registry import read_artefact as read_map
     from reachmap.maps.records import BinMap, BinPlacement, Status, WorkspaceMap
     from reachmap.motions.library import MotionLibrary
-    from reachmap.ranking.lookup.order import Ranking
+    from reachmap.ranking.lookup.costs import Ranking
     from reachmap.ranking.lookup.ranker import Ranker
     from reachmap.ranking.lookup.settings import RankSettings
     from reachmap.runtime.options import RunOptions
@@ -54,7 +54,7 @@ _HOMES: Final[dict[str, str]] = {
     "MotionLibrary": "motions.library",
     "RankSettings": "ranking.lookup.settings",
     "Ranker": "ranking.lookup.ranker",
-    "Ranking": "ranking.lookup.order",
+    "Ranking": "ranking.lookup.costs",
     "ReachmapError": "errors",
     "RunOptions": "runtime.options",
     "Scene": "core.scene",

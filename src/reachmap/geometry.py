@@ -241,3 +241,40 @@ def pieces(path: FloatArray, longest: float) -> FloatArray:
         shares = np.arange(1, count + 1)[:, None] / count
         parts.append(q_from + shares * (q_to - q_from))
     return np.vstack(parts)
+
+
+def rotation_between(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Smallest rotation that turns unit vector a into unit vector b.
+
+    Opposite vectors have no smallest one: there the half turn is about the
+    coordinate axis most nearly perpendicular to a (the first of them), made
+    perpendicular.
+
+    Parameters
+    ----------
+    a, b : array, shape (..., 3)
+
+    Returns
+    -------
+    array, shape (..., 3, 3)
+    """
+    a, b = np.broadcast_arrays(np.asarray(a, float), np.asarray(b, float))
+    total = a + b
+    length = np.linalg.norm(total, axis=-1, keepdims=True)
+    opposite = length < 1e-6
+    middle = total / np.where(opposite, 1.0, length)
+    middle = np.where(opposite, _perpendicular(a), middle)
+    # Two half turns, about a and about the middle of a and b, make the smallest
+    # rotation from a to b without dividing by 1 + a·b.
+    half_turn = _half_turn(middle) @ _half_turn(a)
+    return np.where(opposite[..., None], _half_turn(middle), half_turn)
+
+
+def _half_turn(u: FloatArray) -> FloatArray:
+    return np.asarray(2.0 * u[..., :, None] * u[..., None, :] - np.eye(3))
+
+
+def _perpendicular(a: FloatArray) -> FloatArray:
+    helper = np.eye(3)[np.argmin(np.abs(a), axis=-1)]
+    u = helper - np.sum(helper * a, axis=-1, keepdims=True) * a
+    return np.asarray(u / np.linalg.norm(u, axis=-1, keepdims=True))

@@ -19,8 +19,8 @@ from reachmap.maps import read_bin_map, write_bin_map
 from reachmap.maps.parts import StageStatus
 from reachmap.ranking import Ranker
 from reachmap.ranking.lookup.bin_room import BinRoom
+from reachmap.ranking.lookup.costs import status_name
 from reachmap.ranking.lookup.matching import Queries
-from reachmap.ranking.lookup.order import status_name
 from tests.support.cycle_maps import with_cycles
 from tests.support.optional import present
 

@@ -13,7 +13,7 @@ import pytest
 from reachmap.errors import MapFileError
 from reachmap.maps import read_bin_map, write_bin_map
 from reachmap.ranking import Ranker
-from reachmap.ranking.lookup.calibration import (
+from reachmap.ranking.lookup.probability import (
     Calibration,
     calibration_beside,
     read_calibration,

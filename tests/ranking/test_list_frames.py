@@ -18,7 +18,7 @@ from reachmap.geometry import (
 from reachmap.maps.records import Provenance
 from reachmap.ranking.answers.pipeline import pose_from_numbers
 from reachmap.ranking.lists.reading import grasps_from_document
-from reachmap.ranking.lookup.frames import frames_of, place_grasps
+from reachmap.ranking.lookup.queries import frames_of, place_grasps
 from tests.support.ranking_maps import make_bin_map
 
 BIN_MAP = make_bin_map()

@@ -27,9 +27,8 @@ from reachmap.ranking import (
     align,
     rotation_between,
 )
-from reachmap.ranking.lookup.approach import tcp_rotation
-from reachmap.ranking.lookup.costs import outside_map
-from reachmap.ranking.lookup.order import stable_order
+from reachmap.ranking.lookup.costs import outside_map, stable_order
+from reachmap.ranking.lookup.queries import tcp_rotation
 from reachmap.ranking.lookup.settings import Roll
 from reachmap.ranking.lookup.table import quaternion_angle
 from tests.support.optional import present

@@ -19,7 +19,7 @@ from reachmap.maps import read_bin_map, write_bin_map
 from reachmap.maps.parts import Refinement
 from reachmap.maps.records import Status
 from reachmap.ranking import Ranker
-from reachmap.ranking.lookup.approach import complete_rotation
+from reachmap.ranking.lookup.queries import complete_rotation
 from reachmap.sampling.volume import GraspVolume
 from reachmap.tools.info import info
 from tests.support.optional import present

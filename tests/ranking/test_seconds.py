@@ -16,9 +16,9 @@ from reachmap.maps import write_bin_map
 from reachmap.maps.cycle.seconds import throughput_of
 from reachmap.maps.parts import StageStatus
 from reachmap.ranking import Ranker
-from reachmap.ranking.lookup.order import status_name
+from reachmap.ranking.lookup.costs import status_name
+from reachmap.ranking.lookup.probability import Surroundings
 from reachmap.ranking.lookup.queries import queries_from_arrays
-from reachmap.ranking.lookup.surroundings import Surroundings
 from reachmap.tools.schema import schema
 from tests.support.command_line import reachmap
 from tests.support.cycle_maps import WAITS_S, with_cycles

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from reachmap.ranking import Ranker
-from reachmap.ranking.lookup.approach import complete_rotation
-from reachmap.ranking.lookup.surroundings import KERNEL_STEPS, MAP_WEIGHT
+from reachmap.ranking.lookup.probability import KERNEL_STEPS, MAP_WEIGHT
+from reachmap.ranking.lookup.queries import complete_rotation
 from tests.support.ranking_maps import make_bin_map
 
 BIN_MAP = make_bin_map(seed=5, reachable=0.6, shape=(2, 4, 5))

@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 from reachmap.cli import group
 from reachmap.errors import SettingsError
 from reachmap.ranking import Ranker
-from reachmap.ranking.lookup.order import INVALID, OUTSIDE_MAP, UNLIKE_MAP
+from reachmap.ranking.lookup.costs import INVALID, OUTSIDE_MAP, UNLIKE_MAP
 from tests.support.ranking_maps import make_bin_map
 
 BIN_MAP = make_bin_map(seed=7, reachable=0.6)

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from reachmap.cell.loading import read_cell
 from reachmap.cell.model.orientations import ConeFamily, ListFamily
 from reachmap.geometry import rotation_angle, rotation_from_rpy_deg
-from reachmap.ranking.lookup.approach import align
+from reachmap.ranking.lookup.queries import align
 from reachmap.sampling.orientations import (
     approach_directions,
     orientation_set,

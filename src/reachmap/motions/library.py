@@ -34,10 +34,10 @@ from reachmap.maps.provenance import cell_of_artefact
 from reachmap.maps.records import BinMap
 from reachmap.motions.motion import Motion, best_rows, timed, way_points
 from reachmap.ranking.answers.cell_check import differing_sections
-from reachmap.ranking.lookup.approach import align
 from reachmap.ranking.lookup.costs import outside_map
 from reachmap.ranking.lookup.matching import Queries
 from reachmap.ranking.lookup.queries import (
+    align,
     queries_from_arrays,
     rotations_from_quaternions,
 )

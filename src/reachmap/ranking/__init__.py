@@ -13,6 +13,7 @@ engine is imported.
 
 from __future__ import annotations
 
+from reachmap.geometry import rotation_between
 from reachmap.ranking.answers.pipeline import rank_list
 from reachmap.ranking.answers.ranked_list import (
     RankedList,
@@ -21,8 +22,8 @@ from reachmap.ranking.answers.ranked_list import (
 )
 from reachmap.ranking.lists.arrays import GraspList
 from reachmap.ranking.lists.reading import grasps_from_document, read_grasps
-from reachmap.ranking.lookup.approach import align, rotation_between
-from reachmap.ranking.lookup.order import OUTSIDE_MAP, Ranking, status_name
+from reachmap.ranking.lookup.costs import OUTSIDE_MAP, Ranking, status_name
+from reachmap.ranking.lookup.queries import align
 from reachmap.ranking.lookup.ranker import Ranker
 from reachmap.ranking.lookup.settings import CostBasis, RankSettings
 

@@ -27,9 +27,9 @@ from reachmap.geometry import (
 )
 from reachmap.maps.parts import Refinement
 from reachmap.maps.records import Status
-from reachmap.ranking.lookup.approach import complete_rotation
 from reachmap.ranking.lookup.bin_room import BinRoom
 from reachmap.ranking.lookup.matching import Queries
+from reachmap.ranking.lookup.queries import complete_rotation
 from reachmap.runtime.job import Job, Stages, blocks
 from reachmap.sampling.frames import approach_distance_m, bin_test_frames
 from reachmap.sampling.orientations import approach_directions

@@ -28,8 +28,8 @@ from reachmap.picking.emptying import (
     summarise_heap,
 )
 from reachmap.picking.heap import Heap, drop_heap
-from reachmap.ranking.lookup.calibration import usual_calibration
-from reachmap.ranking.lookup.order import OUTSIDE_MAP, UNLIKE_MAP
+from reachmap.ranking.lookup.costs import OUTSIDE_MAP, UNLIKE_MAP
+from reachmap.ranking.lookup.probability import usual_calibration
 from reachmap.ranking.lookup.ranker import Ranker
 
 logger = logging.getLogger(__name__)

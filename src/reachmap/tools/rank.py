@@ -26,7 +26,7 @@ from reachmap.ranking.answers.ranked_list import (
 )
 from reachmap.ranking.lists.arrays import GraspList
 from reachmap.ranking.lists.reading import STDIN, read_grasps
-from reachmap.ranking.lookup.calibration import calibration_beside, usual_calibration
+from reachmap.ranking.lookup.probability import calibration_beside, usual_calibration
 from reachmap.ranking.lookup.ranker import Ranker
 from reachmap.ranking.lookup.settings import CostBasis, Invalid, RankSettings
 

@@ -20,8 +20,8 @@ from reachmap.maps.records import BinMap
 from reachmap.ranking.answers.pipeline import pose_from_numbers, rank_list
 from reachmap.ranking.answers.ranked_list import RankedList
 from reachmap.ranking.lists.reading import STDIN
-from reachmap.ranking.lookup.calibration import calibration_beside
 from reachmap.ranking.lookup.costs import cycle_of
+from reachmap.ranking.lookup.probability import calibration_beside
 from reachmap.ranking.lookup.ranker import Ranker
 from reachmap.ranking.lookup.settings import CostBasis, RankSettings
 from reachmap.runtime.options import IN_PROCESS, RunOptions

@@ -16,7 +16,7 @@ from scipy.optimize import isotonic_regression
 
 from reachmap._typing import BoolArray, FloatArray
 from reachmap.errors import SettingsError
-from reachmap.ranking.lookup.calibration import Calibration
+from reachmap.ranking.lookup.probability import Calibration
 from reachmap.validation.statistics import Share, share_of
 
 BINS: Final = 10

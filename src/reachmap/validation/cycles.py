@@ -11,7 +11,7 @@ import numpy as np
 from reachmap._typing import BoolArray, CodeArray, FloatArray, IntArray
 from reachmap.maps.parts import freeze
 from reachmap.ranking.answers.ranked_list import RankedList
-from reachmap.ranking.lookup.order import OUTSIDE_MAP
+from reachmap.ranking.lookup.costs import OUTSIDE_MAP
 from reachmap.ranking.lookup.ranker import Ranker
 from reachmap.ranking.lookup.settings import EVEN, RankSettings
 from reachmap.validation.cycle_planning import CycleResults

@@ -6,7 +6,7 @@ import dataclasses
 from typing import Any
 
 from reachmap.maps.bytes.to_json import json_ready
-from reachmap.ranking.lookup.order import status_name
+from reachmap.ranking.lookup.costs import status_name
 from reachmap.ranking.lookup.table import TERMS
 from reachmap.scans.measured import MEASURED
 from reachmap.validation.cycles import CycleSummary

@@ -11,7 +11,7 @@ from reachmap._typing import BoolArray, CodeArray, FloatArray, IntArray
 from reachmap.maps.parts import freeze
 from reachmap.maps.records import BinMap
 from reachmap.ranking.answers.ranked_list import QUADRANT_ORDER, RankedList
-from reachmap.ranking.lookup.order import OUTSIDE_MAP
+from reachmap.ranking.lookup.costs import OUTSIDE_MAP
 from reachmap.ranking.lookup.ranker import Ranker
 from reachmap.scans.measured import MEASURED
 from reachmap.validation.cycles import JudgedCycles

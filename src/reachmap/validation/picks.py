@@ -11,7 +11,7 @@ from reachmap._typing import BoolArray, FloatArray, IntArray
 from reachmap.geometry import rotation_from_quaternion_wxyz, transform_from_parts
 from reachmap.maps.parts import freeze
 from reachmap.ranking.answers.ranked_list import RankedList
-from reachmap.ranking.lookup.approach import align
+from reachmap.ranking.lookup.queries import align
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -10,8 +10,8 @@ from reachmap._typing import FloatArray
 from reachmap.errors import SettingsError
 from reachmap.maps.records import BinMap, Status
 from reachmap.ranking.answers.ranked_list import RankedList, quadrant_ranks
+from reachmap.ranking.lookup.costs import OUTSIDE_MAP, UNLIKE_MAP, status_name
 from reachmap.ranking.lookup.matching import Queries
-from reachmap.ranking.lookup.order import OUTSIDE_MAP, UNLIKE_MAP, status_name
 from reachmap.ranking.lookup.ranker import Ranker
 from reachmap.text import printable
 

@@ -17,10 +17,9 @@ from reachmap.maps.cycle.seconds import throughput_of
 from reachmap.ranking.answers.plausibility import plausibility_warnings
 from reachmap.ranking.answers.ranked_list import RankedList
 from reachmap.ranking.lists.arrays import GraspList
-from reachmap.ranking.lookup.frames import place_grasps
+from reachmap.ranking.lookup.costs import Ranking
 from reachmap.ranking.lookup.matching import Queries
-from reachmap.ranking.lookup.order import Ranking
-from reachmap.ranking.lookup.queries import queries_from_arrays
+from reachmap.ranking.lookup.queries import place_grasps, queries_from_arrays
 from reachmap.ranking.lookup.ranker import Ranker
 from reachmap.ranking.lookup.settings import RankSettings
 from reachmap.ranking.lookup.table import TERMS

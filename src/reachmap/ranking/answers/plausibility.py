@@ -20,7 +20,7 @@ from reachmap.geometry import (
     yaw_transform,
 )
 from reachmap.ranking.lists.arrays import GraspList
-from reachmap.ranking.lookup.order import UNMATCHED, Ranking
+from reachmap.ranking.lookup.costs import UNMATCHED, Ranking
 
 SOME: Final = 0.1
 """Share of unmatched grasps from which a list is looked at more closely: a heap has a

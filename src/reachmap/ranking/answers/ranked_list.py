@@ -19,9 +19,14 @@ from reachmap.errors import SettingsError
 from reachmap.maps.bytes.publish import make_folder, publish
 from reachmap.ranking.lists.arrays import GraspList
 from reachmap.ranking.lists.reading import STDIN
-from reachmap.ranking.lookup.costs import LIKENESS
+from reachmap.ranking.lookup.costs import (
+    INVALID,
+    LIKENESS,
+    OUTSIDE_MAP,
+    Ranking,
+    status_name,
+)
 from reachmap.ranking.lookup.matching import Queries
-from reachmap.ranking.lookup.order import INVALID, OUTSIDE_MAP, Ranking, status_name
 from reachmap.ranking.lookup.settings import MARGINS, RankSettings
 from reachmap.ranking.lookup.table import TERMS
 

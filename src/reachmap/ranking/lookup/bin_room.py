@@ -23,12 +23,12 @@ from reachmap.geometry import (
     axis_rotations,
     axis_vector,
     inverse_transform,
+    rotation_between,
     rotation_from_quaternion_wxyz,
 )
 from reachmap.maps.records import BinMap
-from reachmap.ranking.lookup.approach import rotation_between
-from reachmap.ranking.lookup.frames import pose_matrix
 from reachmap.ranking.lookup.matching import Queries
+from reachmap.ranking.lookup.queries import pose_matrix
 
 # Turns of the tool that are asked where any will do.
 _TURNS = 24

@@ -1,4 +1,4 @@
-"""The cost of grasps: the requested terms, their median over neighbours, likeness.
+"""The cost of grasps, and the order it puts them in, with a reason for each.
 
 J = α φ3 + β φ4 + δ φ5 + ε φ6, with φ3, φ4, φ5 the mean path length, planning time and
 execution time of the test grasp, each divided by a high quantile (or the maximum) over
@@ -11,15 +11,130 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from reachmap._typing import BoolArray, FloatArray, IntArray
+from reachmap._typing import BoolArray, CodeArray, FloatArray, IntArray
 from reachmap.errors import SettingsError
+from reachmap.maps.parts import StageStatus, freeze
 from reachmap.ranking.lookup.matching import Matches, NearestPoints, Queries
+from reachmap.ranking.lookup.probability import orientation_kernel
 from reachmap.ranking.lookup.settings import ALIKE_STEPS, MARGINS, RankSettings
 from reachmap.ranking.lookup.table import TERMS, GraspTable
 from reachmap.ranking.terms import PLANNING, CycleSeconds
 
-LIKENESS = "likeness"
+LIKENESS: Final = "likeness"
+# Beyond half a grid diagonal sideways, and so far above or below the layers: grasp
+# points of a heap lie centimetres above and below the height that stands for them.
+SIDEWAYS_TOLERANCE_M: Final = 1e-3
+VERTICAL_TOLERANCE_M: Final = 0.05
+BOTTOM_TOLERANCE_M: Final = 5e-3
+MIN_DISTANCE_M: Final = 1e-6
+# Width of the kernel of likeness in spacings of the orientations. Chosen on maps of the
+# machine door and the two bins of benchmarks/hard_cells, where 0.2 to 0.4 hardly differ
+# (docs/explanation/prediction.md).
+MEDIAN_STEPS: Final = 0.3
+# Grasps that are compared with all their neighbours at once: some 100 MB.
+ROWS_AT_ONCE: Final = 2000
+
+OUTSIDE_MAP: Final = 254
+UNLIKE_MAP: Final = 253
+INVALID: Final = 252
+UNMATCHED: Final = {
+    OUTSIDE_MAP: "outside_map",
+    UNLIKE_MAP: "unlike_map",
+    INVALID: "invalid",
+}
+"""States of grasps that the map says nothing about, beside those of test grasps."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Ranking:
+    """The order of a list of grasps, and why. Rows are in supplied order.
+
+    Attributes
+    ----------
+    order : int array, shape (n,)
+        Supplied numbers of the grasps, best first; unreachable ones last in their
+        supplied order.
+    cost : array, shape (n,)
+        J, or predicted seconds per pick; inf where unreachable.
+    terms : array, shape (n, k)
+        α φ3, β φ4, δ φ5, ε φ6 and the margins that were asked for, each with its
+        weight, or seconds by stage; they add up to the cost. NaN where unreachable.
+    term_names : tuple of str, length k
+    status : uint8 array, shape (n,)
+        :class:`reachmap.maps.records.Status` of the test grasp, or ``OUTSIDE_MAP``
+        (too far from the test points), ``UNLIKE_MAP`` (no orientation is near enough)
+        or ``INVALID`` (not finite, no direction, no rotation). Where the cost is of
+        cycles, :class:`reachmap.maps.parts.StageStatus` of the stage that fails.
+    test_grasp : int array, shape (n, 4)
+        Layer, y, x, orientation of the nearest test grasp; -1 where invalid.
+    distance : array, shape (n,)
+        φ1 [m].
+    angle : array, shape (n,)
+        φ2 [rad]; between approach axes where the roll is free.
+    roll_free : bool array, shape (n,)
+    extrapolated : bool array, shape (n,)
+        Beyond the outermost test points, where the map continues what it knows.
+    probability : array, shape (n,)
+        That planning reaches the grasp: calibrated where the ranker has a calibration,
+        else the share reached around it; NaN where the map says nothing.
+    orientation_wxyz : array, shape (n, 4)
+        The tool orientation to use, in robot_base: R_test of the test grasp, turned
+        about the approach by the roll that its best path takes, where roll is free.
+    """
+
+    order: IntArray
+    cost: FloatArray
+    terms: FloatArray
+    term_names: tuple[str, ...]
+    status: CodeArray
+    test_grasp: IntArray
+    distance: FloatArray
+    angle: FloatArray
+    roll_free: BoolArray
+    extrapolated: BoolArray
+    probability: FloatArray
+    orientation_wxyz: FloatArray
+
+    def __post_init__(self) -> None:
+        freeze(self)
+
+    def __repr__(self) -> str:
+        return f"<Ranking: {len(self.order)} grasps, {self.reachable.sum()} reachable>"
+
+    @property
+    def rank(self) -> IntArray:
+        """Rank of each grasp, from 1, in supplied order; shape (n,)."""
+        rank = np.empty(len(self.order), np.int64)
+        rank[self.order] = np.arange(1, len(self.order) + 1)
+        return rank
+
+    @property
+    def reachable(self) -> BoolArray:
+        """Where the cost is finite, shape (n,)."""
+        return np.isfinite(self.cost)
+
+
+def status_name(code: int) -> str:
+    """Name of a status code as files have it, ``path_found`` for one."""
+    return UNMATCHED.get(int(code)) or StageStatus(int(code)).name.lower()
+
+
+def stable_order(cost: FloatArray, scores: ArrayLike | None = None) -> IntArray:
+    """Order of costs, shape (n,): ties by score, higher first, then as supplied.
+
+    Costs that differ by rounding only, beyond the twelfth decimal, tie. Infinite costs
+    come last in supplied order whatever their scores; so do missing (NaN) scores among
+    ties.
+    """
+    key = np.round(cost, 12)
+    if scores is None:
+        return np.argsort(key, kind="stable")
+    given = np.asarray(scores, float)
+    worst_first = np.where(np.isnan(given), -np.inf, given)
+    second = np.where(np.isfinite(cost), -worst_first, 0.0)
+    return np.lexsort((second, key))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -103,20 +218,6 @@ def _seconds(table: GraspTable, cycle: CycleSeconds) -> Columns:
         weights=np.ones(values.shape[-1]),
         values=values,
     )
-
-
-# Beyond half a grid diagonal sideways, and so far above or below the layers: grasp
-# points of a heap lie centimetres above and below the height that stands for them.
-SIDEWAYS_TOLERANCE_M: Final = 1e-3
-VERTICAL_TOLERANCE_M: Final = 0.05
-BOTTOM_TOLERANCE_M: Final = 5e-3
-MIN_DISTANCE_M: Final = 1e-6
-# Width of the kernel of likeness in spacings of the orientations. Chosen on maps of the
-# machine door and the two bins of benchmarks/hard_cells, where 0.2 to 0.4 hardly differ
-# (docs/explanation/prediction.md).
-MEDIAN_STEPS: Final = 0.3
-# Grasps that are compared with all their neighbours at once: some 100 MB.
-ROWS_AT_ONCE: Final = 2000
 
 
 def outside_map(points: FloatArray, nearest: IntArray, table: GraspTable) -> BoolArray:
@@ -217,32 +318,26 @@ def median_terms(
         for part in np.array_split(rows, -(-len(rows) // ROWS_AT_ONCE)):
             some = queries.take(part)
             distance, point = tree.in_order(some.points, neighbours)
-            weight = _likeness(some, table, point, free=free)
-            weight /= np.maximum(distance, MIN_DISTANCE_M)[..., None]
+            vectors, stored = (
+                (some.axes, table.axes)
+                if free
+                else (some.quaternions, table.quaternions)
+            )
+            kernel, _ = orientation_kernel(
+                np.repeat(vectors, point.shape[1], axis=0),
+                table.distinct(stored),
+                point.ravel(),
+                MEDIAN_STEPS * float(table.spacing_rad[0 if free else 1]),
+                free=free,
+            )
+            near_m = np.maximum(distance, MIN_DISTANCE_M)
+            weight = kernel.reshape(*point.shape, -1) / near_m[..., None]
             row, middle = _weighted_median(
                 cost[point].reshape(len(part), -1), weight.reshape(len(part), -1)
             )
             near, orientation = np.divmod(middle, cost.shape[1])
             terms[part[row]] = columns.values[point[row, near], orientation]
     return terms
-
-
-def _likeness(
-    queries: Queries,
-    table: GraspTable,
-    point: IntArray,
-    *,
-    free: bool,
-) -> FloatArray:
-    """Kernel of φ2, 1 for the most alike at each point (n, k); shape (n, k, m)."""
-    stored = table.axes if free else table.quaternions
-    vectors = queries.axes if free else queries.quaternions
-    cosine = np.einsum("nk,npmk->npm", vectors, stored[point])
-    if not free:
-        # Between quaternions the product is the cosine of half the angle.
-        cosine = 2.0 * cosine**2 - 1.0
-    width = MEDIAN_STEPS * float(table.spacing_rad[0 if free else 1])
-    return np.asarray(np.exp((cosine - cosine.max(axis=-1, keepdims=True)) / width**2))
 
 
 def _weighted_median(cost: FloatArray, weight: FloatArray) -> tuple[IntArray, IntArray]:

@@ -326,20 +326,22 @@ def _cosines(queries: Queries, table: GraspTable, point: IntArray) -> FloatArray
     """
     free = queries.free
     if free.all():
-        return _products(queries.axes, table.axes, point, table)
+        return products(queries.axes, table.distinct(table.axes), point)
     if not free.any():
-        return np.abs(_products(queries.quaternions, table.quaternions, point, table))
+        quaternions = table.distinct(table.quaternions)
+        return np.abs(products(queries.quaternions, quaternions, point))
     cosines = np.empty((len(queries), table.axes.shape[1]))
     for rows in (np.flatnonzero(free), np.flatnonzero(~free)):
         cosines[rows] = _cosines(queries.take(rows), table, point[rows])
     return cosines
 
 
-def _products(
-    vectors: FloatArray, stored: FloatArray, point: IntArray, table: GraspTable
-) -> FloatArray:
-    """Scalar products with every orientation of one point each, shape (n, m)."""
-    if table.same_everywhere:
+def products(vectors: FloatArray, stored: FloatArray, point: IntArray) -> FloatArray:
+    """Scalar products with every orientation of one point each, shape (n, m).
+
+    Where all points have the same orientations, those of one will do.
+    """
+    if len(stored) == 1:
         return np.asarray(vectors @ stored[0].T)
     return np.asarray(np.einsum("nk,nmk->nm", vectors, stored[point]))
 

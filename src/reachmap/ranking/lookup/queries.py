@@ -1,21 +1,217 @@
-"""Grasps from arrays: checked row by row, with whether their roll is fixed."""
+"""Grasps of lists and of arrays, in robot_base and as those of the TCP: queries.
+
+Arrays are checked row by row, and whether the roll of each is fixed is determined. The
+grasps of a list come from a frame that stands still in the cell of the map.
+"""
 
 from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from reachmap._typing import BoolArray, FloatArray
-from reachmap.errors import SettingsError
+from reachmap.errors import GraspListError, MapFileError, SettingsError
 from reachmap.geometry import (
+    AXES,
     axis_vector,
+    inverse_transform,
     quaternion_wxyz_from_rotation,
+    rotation_between,
     rotation_from_quaternion_wxyz,
+    rotation_from_rpy_deg,
+    transform_from_parts,
 )
-from reachmap.ranking.lookup.approach import complete_rotation
+from reachmap.maps.records import BinMap
+from reachmap.ranking.lists.arrays import GraspList
 from reachmap.ranking.lookup.matching import Queries
 from reachmap.ranking.lookup.settings import Invalid, Roll
 from reachmap.ranking.lookup.table import GraspTable
+
+
+def frames_of(bin_map: BinMap) -> dict[str, FloatArray]:
+    """Frames that stand still in the cell, as poses in robot_base, (4, 4) each.
+
+    ``bin``, ``robot_base``, ``world``, and the bodies fixed to the world or the base.
+    What moves with the arm, the camera for one, has no place without a configuration
+    and is not among them.
+    """
+    try:
+        cell = json.loads(bin_map.provenance.cell_resolved_json or "{}")
+        frames = _standing_frames(cell)
+    except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
+        raise MapFileError(f"the cell in the bin map is unreadable: {error}") from None
+    return {**frames, "bin": bin_map.bin_pose}
+
+
+def _standing_frames(cell: Mapping[str, Any]) -> dict[str, FloatArray]:
+    base_pose = cell.get("robot", {}).get("base_pose")
+    T_base_world = inverse_transform(pose_matrix(base_pose))
+    parents = {"world": T_base_world, "robot_base": np.eye(4)}
+    frames = {
+        str(body["name"]): parents[body["attach_to"]] @ pose_matrix(body["pose"])
+        for body in cell.get("bodies", [])
+        if body["attach_to"] in parents
+    }
+    return {**frames, **parents}
+
+
+def place_grasps(
+    grasps: GraspList,
+    frames: Mapping[str, FloatArray],
+    tcp_axis: str,
+    T_base_frame: FloatArray | None = None,
+) -> GraspList:
+    """Express grasps in robot_base and as the TCP, for the bin where the map has it.
+
+    Parameters
+    ----------
+    grasps : GraspList
+        With ``T_frame_bin``, the grasps keep their place in the bin and move with it
+        from where it was to where it is; their frame may then have any name.
+    frames : mapping
+        Poses in robot_base, as :func:`frames_of` returns them.
+    tcp_axis : str
+        TCP axis that approaches, as the map has it.
+    T_base_frame : array, shape (4, 4), optional
+        Pose of the grasps' frame in robot_base, for frames the cell does not know.
+
+    Raises
+    ------
+    GraspListError
+        The frame is unknown, or it is stated twice and differently.
+    """
+    T = _frame_pose(grasps, frames, T_base_frame)
+    R = T[:3, :3]
+    return replace(
+        grasps,
+        frame="robot_base",
+        T_frame_bin=None,
+        points=grasps.points @ R.T + T[:3, 3],
+        directions=grasps.directions @ R.T,
+        rotations=tcp_rotation(R @ grasps.rotations, grasps.approach_axis, tcp_axis),
+        approach_axis=tcp_axis,
+    )
+
+
+def _frame_pose(
+    grasps: GraspList,
+    frames: Mapping[str, FloatArray],
+    T_base_frame: FloatArray | None,
+) -> FloatArray:
+    if grasps.T_frame_bin is not None:
+        if T_base_frame is not None:
+            raise GraspListError(
+                f"{grasps.source}: the list has a bin_pose, which places it; a pose of "
+                "its frame besides would contradict it"
+            )
+        is_bin = grasps.frame == "bin"
+        if is_bin and not np.allclose(grasps.T_frame_bin, np.eye(4), atol=1e-9):
+            raise GraspListError(
+                f"{grasps.source}: bin_pose: in the frame 'bin' the bin is at the "
+                "origin; name the frame the bin_pose was measured in, or leave it out"
+            )
+        return frames["bin"] @ inverse_transform(grasps.T_frame_bin)
+    if T_base_frame is not None:
+        return T_base_frame
+    if grasps.frame not in frames:
+        known = ", ".join(sorted(frames))
+        raise GraspListError(
+            f"{grasps.source}: frame: {grasps.frame!a} is none of those that stand "
+            f"still in the map's cell ({known}); give its pose with --frame-pose, or "
+            "the list a bin_pose"
+        )
+    return frames[grasps.frame]
+
+
+def pose_matrix(pose: Mapping[str, Any] | None) -> FloatArray:
+    """Read a pose of the resolved cell, shape (4, 4)."""
+    if not pose:
+        return np.eye(4)
+    if pose.get("quaternion_wxyz") is not None:
+        R = rotation_from_quaternion_wxyz(np.array(pose["quaternion_wxyz"], float))
+    else:
+        R = rotation_from_rpy_deg(np.array(pose.get("rpy_deg") or (0, 0, 0), float))
+    return transform_from_parts(R, np.array(pose.get("xyz", (0, 0, 0)), float))
+
+
+def tcp_rotation(R: FloatArray, grasp_axis: str, tcp_axis: str) -> FloatArray:
+    """Orientation of the TCP for a grasp whose approach is another tool axis.
+
+    The TCP frame is turned by the smallest rotation so that its own approach axis
+    takes the place of the grasp's; the axis perpendicular to both stays. From
+    ``+x`` (GraspNet) to ``+z`` the y axis, along which a gripper closes, is kept.
+
+    Parameters
+    ----------
+    R : array, shape (..., 3, 3)
+        Orientation in the grasp's convention.
+    grasp_axis, tcp_axis : str
+        Signed axis names: approach axis in either convention.
+
+    Returns
+    -------
+    array, shape (..., 3, 3)
+        ``R`` itself when the conventions agree.
+    """
+    if grasp_axis == tcp_axis:
+        return R
+    return np.asarray(
+        R @ rotation_between(axis_vector(tcp_axis), axis_vector(grasp_axis))
+    )
+
+
+def complete_rotation(
+    directions: FloatArray, R_base_bin: FloatArray, tcp_axis: str
+) -> FloatArray:
+    """Orientation for a direction whose roll is to be fixed by rule.
+
+    The upright tool of the orientation families, straight down into the bin and
+    square to its sides, is turned into the direction by the smallest rotation: where
+    a cone family has that direction, this is its roll 0.
+
+    Parameters
+    ----------
+    directions : array, shape (n, 3)
+        Unit approach directions in robot_base.
+    R_base_bin : array, shape (3, 3)
+    tcp_axis : str
+
+    Returns
+    -------
+    array, shape (n, 3, 3)
+        TCP orientations in robot_base.
+    """
+    # Imported here: it brings the cell's data model, which ranking does not need.
+    from reachmap.sampling.orientations import straight_down_orientation
+
+    R_base_upright = R_base_bin @ straight_down_orientation(tcp_axis)
+    return align(R_base_upright, directions, tcp_axis)
+
+
+def align(R: FloatArray, directions: FloatArray, tcp_axis: str) -> FloatArray:
+    """Turn orientations by the smallest rotation so that they approach exactly so.
+
+    Parameters
+    ----------
+    R : array, shape (3, 3) or (n, 3, 3)
+        TCP orientations, for instance those recommended by a ranking.
+    directions : array, shape (n, 3)
+        Unit approach directions, same frame.
+    tcp_axis : str
+        TCP axis that points into the object.
+
+    Returns
+    -------
+    array, shape (n, 3, 3)
+    """
+    index, sign = AXES[tcp_axis]
+    return np.asarray(rotation_between(sign * R[..., :, index], directions) @ R)
+
 
 # Printed matrices have three decimals.
 ORTHONORMAL_WITHIN = 1e-2
@@ -45,7 +241,7 @@ def queries_from_arrays(
         TCP orientations. A row of NaN has none; its direction counts then.
     roll : {"as-given", "free", "fixed"}
         A direction whose roll is to be fixed gets the orientation of
-        :func:`reachmap.ranking.lookup.approach.complete_rotation`.
+        :func:`complete_rotation`.
     invalid : {"mark", "raise"}
         Rows that are not finite, have no direction or no rotation are left out of the
         matching, or named in an error.

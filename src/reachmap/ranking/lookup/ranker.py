@@ -16,19 +16,22 @@ from reachmap.maps.format.bin import read_bin_map
 from reachmap.maps.parts import StageStatus
 from reachmap.maps.records import BinMap, Stamp
 from reachmap.ranking.lookup.bin_room import BinRoom
-from reachmap.ranking.lookup.calibration import Calibration, usual_calibration
 from reachmap.ranking.lookup.costs import (
+    INVALID,
     LIKENESS,
+    OUTSIDE_MAP,
+    UNLIKE_MAP,
     Columns,
+    Ranking,
     beyond_points,
     columns_of,
     cycle_of,
     likeness_terms,
     median_terms,
     outside_map,
+    stable_order,
     unlike_map,
 )
-from reachmap.ranking.lookup.frames import frames_of
 from reachmap.ranking.lookup.matching import (
     Matches,
     NearestPoints,
@@ -37,14 +40,13 @@ from reachmap.ranking.lookup.matching import (
     match_past,
     tied,
 )
-from reachmap.ranking.lookup.order import (
-    INVALID,
-    OUTSIDE_MAP,
-    UNLIKE_MAP,
-    Ranking,
-    stable_order,
+from reachmap.ranking.lookup.probability import (
+    Calibration,
+    Surroundings,
+    usual_calibration,
 )
 from reachmap.ranking.lookup.queries import (
+    frames_of,
     queries_from_arrays,
     rotations_from_quaternions,
 )
@@ -56,7 +58,6 @@ from reachmap.ranking.lookup.settings import (
     RankSettings,
     Roll,
 )
-from reachmap.ranking.lookup.surroundings import Surroundings
 from reachmap.ranking.lookup.table import GraspTable, table_from_bin_map
 from reachmap.ranking.lookup.verdict import RefinedVerdicts
 from reachmap.ranking.terms import FAILURE

@@ -113,6 +113,10 @@ class GraspTable:
     def __post_init__(self) -> None:
         freeze(self)
 
+    def distinct(self, orientations: FloatArray) -> FloatArray:
+        """Orientations (n, m, k) of the points; (1, m, k) where all have the same."""
+        return orientations[:1] if self.same_everywhere else orientations
+
     def sha256(self) -> str:
         """Hash of the costs: equal hashes rank every list alike."""
         digest = hashlib.sha256()
