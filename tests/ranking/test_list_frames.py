@@ -16,7 +16,7 @@ from reachmap.geometry import (
     yaw_transform,
 )
 from reachmap.maps.records import Provenance
-from reachmap.ranking.answers.pipeline import pose_from_numbers
+from reachmap.ranking.answers.ranked_list import pose_from_numbers
 from reachmap.ranking.lists.reading import grasps_from_document
 from reachmap.ranking.lookup.queries import frames_of, place_grasps
 from tests.support.ranking_maps import make_bin_map

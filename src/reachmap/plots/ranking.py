@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import cycle
+from pathlib import Path
 from typing import Final
 
 import numpy as np
@@ -25,6 +26,7 @@ from reachmap.plots.parts.style import (
     new_figure,
     put_title,
 )
+from reachmap.ranking.answers.ranked_list import QUADRANT_ORDER, RankedList
 
 TERM_COLOURS: Final[Mapping[str, str]] = {
     "path_length": "#2f6db3",
@@ -67,6 +69,33 @@ class CostGroup:
     label: str
     supplied: FloatArray
     ranked: FloatArray
+
+
+def cost_groups(ranked: Sequence[RankedList]) -> list[CostGroup]:
+    """Costs of each quadrant, or of each list that names none."""
+    groups = []
+    for one in ranked:
+        terms = np.stack([*one.terms().values()], axis=1)
+        for label, rows in _rows(one, several=len(ranked) > 1).items():
+            order = one.ranking.order
+            best_first = order[np.isin(order, rows)]
+            groups.append(
+                CostGroup(label=label, supplied=terms[rows], ranked=terms[best_first])
+            )
+    return groups
+
+
+def _rows(one: RankedList, *, several: bool) -> dict[str, list[int]]:
+    """Rows of each quadrant; of the whole list if it names none."""
+    name = Path(one.grasps.source).stem if several else ""
+    quadrants = one.grasps.quadrants
+    if not any(quadrants):
+        return {name or "all": list(range(len(quadrants)))} if quadrants else {}
+    return {
+        f"{name} {quadrant or 'other'}".strip(): rows
+        for quadrant in QUADRANT_ORDER
+        if (rows := [row for row, own in enumerate(quadrants) if own == quadrant])
+    }
 
 
 def ranking_chart(

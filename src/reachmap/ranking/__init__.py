@@ -14,10 +14,10 @@ engine is imported.
 from __future__ import annotations
 
 from reachmap.geometry import rotation_between
-from reachmap.ranking.answers.pipeline import rank_list
 from reachmap.ranking.answers.ranked_list import (
     RankedList,
     document_text,
+    rank_list,
     ranked_document,
 )
 from reachmap.ranking.lists.arrays import GraspList

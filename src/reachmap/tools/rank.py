@@ -8,21 +8,23 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from reachmap.disk import as_path
+from reachmap.disk import as_path, is_folder
 from reachmap.errors import GateFailedError, MapFileError, SettingsError
 from reachmap.maps import read_bin_map
-from reachmap.maps.bytes.publish import check_outputs, check_picture
+from reachmap.maps.bytes.publish import (
+    check_outputs,
+    check_picture,
+    make_folder,
+    publish,
+)
 from reachmap.maps.records import BinMap
 from reachmap.ranking.answers.explain import explanation, find_grasp
-from reachmap.ranking.answers.pipeline import pose_from_numbers, rank_list
 from reachmap.ranking.answers.ranked_list import (
     RankedList,
-    cost_groups,
     document_text,
-    joined,
+    pose_from_numbers,
+    rank_list,
     ranked_document,
-    targets_of,
-    write_lists,
 )
 from reachmap.ranking.lists.arrays import GraspList
 from reachmap.ranking.lists.reading import STDIN, read_grasps
@@ -153,7 +155,7 @@ def rank(
     settings, list_format = settings or RankSettings(), list_format or ListFormat()
     _check_request(sources, top, chart_top)
     check_picture(chart, "--chart")
-    targets = targets_of(sources, output)
+    targets = _targets_of(sources, output)
     # A cell is a name or a file; either way it is not to be replaced.
     inputs = [map_path, calibration_beside(map_path), cell]
     inputs += [source for source in sources if source != STDIN]
@@ -170,14 +172,14 @@ def rank(
         story = explanation(*find_grasp(ranked, explain), ranker, bin_map)
     documents = [ranked_document(one, top) for one in ranked]
     texts = [document_text(document) for document in documents]
-    write_lists(targets, texts, overwrite=overwrite)
+    _write_lists(targets, texts, overwrite=overwrite)
     if chart is not None:
         _draw(
             chart, ranked, bin_map.stamp.config_sha256, chart_top, overwrite=overwrite
         )
     return RankAnswer(
         documents=tuple(documents),
-        text=joined(texts),
+        text=_joined(texts),
         ranked=tuple(ranked),
         explanation=story,
         written=(*targets, *([] if chart is None else [chart])),
@@ -287,14 +289,10 @@ def _draw(
 ) -> None:
     # Imported here: drawing takes longer than ranking.
     from reachmap.plots.parts.files import write_picture
-    from reachmap.plots.ranking import CostGroup, ranking_chart
+    from reachmap.plots.ranking import cost_groups, ranking_chart
 
-    groups = [
-        CostGroup(label=label, supplied=supplied, ranked=best_first)
-        for label, (supplied, best_first) in cost_groups(ranked).items()
-    ]
     figure = ranking_chart(
-        groups, tuple(ranked[0].terms()), top, subtitle=_subtitle(ranked)
+        cost_groups(ranked), tuple(ranked[0].terms()), top, subtitle=_subtitle(ranked)
     )
     write_picture(
         chart,
@@ -312,3 +310,51 @@ def _subtitle(ranked: Sequence[RankedList]) -> str:
         return f"{names} · a failed pick costs {failure_s:.1f} s"
     alpha, beta, delta = ranked[0].asked.weights
     return f"{names} · J with α = {alpha:g}, β = {beta:g}, δ = {delta:g}"
+
+
+def _targets_of(sources: Sequence[str | Path], output: Path | None) -> list[Path]:
+    """Name the file of each list, or the one file of all.
+
+    Parameters
+    ----------
+    sources : sequence of path
+        The supplied lists.
+    output : Path or None
+        A folder takes ``NAME.ranked.json`` for each list; of several lists, a name
+        without suffix is a folder that is made. Any other name is one file.
+
+    Raises
+    ------
+    OutputError, SettingsError
+        The folder cannot be made, or two lists have the same name.
+    """
+    if output is None:
+        return []
+    if not is_folder(output) and (len(sources) == 1 or output.suffix):
+        return [output]
+    targets = [output / _ranked_name(source) for source in sources]
+    if len(set(targets)) < len(targets):
+        raise SettingsError(
+            "two lists have the same name; rank them one after the other"
+        )
+    make_folder(output)
+    return targets
+
+
+def _ranked_name(source: str | Path) -> str:
+    stem = "stdin" if str(source) == STDIN else Path(source).stem
+    return f"{stem.removesuffix('.ranked')}.ranked.json"
+
+
+def _write_lists(
+    targets: Sequence[Path], texts: Sequence[str], *, overwrite: bool
+) -> None:
+    """Write each list to its file, or all to the one file there is."""
+    contents = texts if len(targets) == len(texts) else [_joined(texts)]
+    for target, text in zip(targets, contents, strict=False):
+        publish(target, [text.encode("ascii")], overwrite=overwrite)
+
+
+def _joined(texts: Sequence[str]) -> str:
+    """Return one JSON value: a document, or a list of several."""
+    return texts[0] if len(texts) == 1 else f"[{','.join(texts)}]\n"

@@ -17,8 +17,11 @@ from reachmap.maps import read_bin_map
 from reachmap.maps.bytes.publish import check_outputs, check_picture, publish_json
 from reachmap.maps.provenance import cell_of_artefact
 from reachmap.maps.records import BinMap
-from reachmap.ranking.answers.pipeline import pose_from_numbers, rank_list
-from reachmap.ranking.answers.ranked_list import RankedList
+from reachmap.ranking.answers.ranked_list import (
+    RankedList,
+    pose_from_numbers,
+    rank_list,
+)
 from reachmap.ranking.lists.reading import STDIN
 from reachmap.ranking.lookup.costs import cycle_of
 from reachmap.ranking.lookup.probability import calibration_beside

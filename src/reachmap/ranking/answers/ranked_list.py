@@ -1,24 +1,22 @@
-"""The ranked grasp list: the same document, re-ordered, each grasp with its reason.
-
-It is written to one file or a folder, never over the supplied list.
-"""
+"""A grasp list through a ranker: the same document, re-ordered, with reasons."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from pathlib import Path
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 
+from reachmap import __version__
 from reachmap._typing import FloatArray
-from reachmap.disk import is_folder
 from reachmap.errors import SettingsError
-from reachmap.maps.bytes.publish import make_folder, publish
+from reachmap.geometry import rotation_from_quaternion_wxyz, transform_from_parts
+from reachmap.maps.bytes.to_json import json_ready
+from reachmap.maps.cycle.seconds import throughput_of
+from reachmap.ranking.answers.plausibility import plausibility_warnings
 from reachmap.ranking.lists.arrays import GraspList
-from reachmap.ranking.lists.reading import STDIN
 from reachmap.ranking.lookup.costs import (
     INVALID,
     LIKENESS,
@@ -27,10 +25,13 @@ from reachmap.ranking.lookup.costs import (
     status_name,
 )
 from reachmap.ranking.lookup.matching import Queries
+from reachmap.ranking.lookup.queries import place_grasps, queries_from_arrays
+from reachmap.ranking.lookup.ranker import Ranker
 from reachmap.ranking.lookup.settings import MARGINS, RankSettings
 from reachmap.ranking.lookup.table import TERMS
 
 TERM_NAMES = (*TERMS, LIKENESS, *MARGINS)
+QUADRANT_ORDER = ("NW", "NE", "SW", "SE", None)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -78,6 +79,123 @@ class RankedList:
         codes, numbers = np.unique(self.ranking.status, return_counts=True)
         found = {status_name(c): int(n) for c, n in zip(codes, numbers, strict=True)}
         return dict(sorted(found.items(), key=lambda item: (-item[1], item[0])))
+
+
+def rank_list(
+    grasps: GraspList,
+    ranker: Ranker,
+    *,
+    settings: RankSettings | None = None,
+    T_base_frame: FloatArray | None = None,
+) -> RankedList:
+    """Rank a grasp list.
+
+    Parameters
+    ----------
+    grasps : GraspList
+    ranker : Ranker
+    settings : RankSettings, optional
+    T_base_frame : array, shape (4, 4), optional
+        Pose of the list's frame in robot_base, where the cell does not know it.
+
+    Raises
+    ------
+    GraspListError
+        The list is in an unknown frame.
+    """
+    settings = settings or RankSettings()
+
+    def queries_of(one: GraspList) -> Queries:
+        axis = ranker.table.approach_axis
+        placed = place_grasps(one, ranker.frames, axis, T_base_frame)
+        return queries_from_arrays(
+            ranker.table,
+            placed.points,
+            placed.directions,
+            placed.rotations,
+            roll=settings.roll,
+            invalid=settings.invalid,
+        )
+
+    queries = queries_of(grasps)
+    ranking = ranker.rank_queries(queries, settings, grasps.scores)
+    return RankedList(
+        grasps=grasps,
+        queries=queries,
+        ranking=ranking,
+        asked=settings,
+        header=_header(ranker, settings, ranking),
+        doubts=plausibility_warnings(
+            grasps,
+            ranking,
+            lambda other: ranker.rank_queries(queries_of(other), settings),
+        ),
+    )
+
+
+def _cost_facts(
+    ranker: Ranker, settings: RankSettings, ranking: Ranking
+) -> Mapping[str, Any]:
+    """What the cost is; for seconds also what a failure costs and picks per hour."""
+    if settings.cost == "paper":
+        return {"cost": "paper"}
+    made = throughput_of(ranking.cost)
+    return {
+        "cost": "cycle",
+        "failure_cost_s": ranker.failure_cost_s(settings),
+        "picks_per_hour": None if made is None else json_ready(asdict(made)),
+    }
+
+
+def _header(
+    ranker: Ranker, settings: RankSettings, ranking: Ranking
+) -> Mapping[str, Any]:
+    table = ranker.table
+    maxima = dict(zip(TERMS, table.maxima.tolist(), strict=True))
+    scale = dict(zip(TERMS, table.scale.tolist(), strict=True))
+    return {
+        "version": __version__,
+        "map_sha256": ranker.stamp.content_sha256,
+        "cost_table_sha256": ranker.cost_table_sha256,
+        "cell_sha256": ranker.stamp.cell_sha256,
+        "calibration": _calibration_facts(ranker),
+        **_cost_facts(ranker, settings, ranking),
+        "weights": list(settings.weights),
+        "likeness": settings.likeness,
+        **({"margins": dict(settings.margins)} if settings.margins else {}),
+        "neighbours": settings.neighbours,
+        "roll": settings.roll,
+        "max_angle_deg": settings.max_angle_deg,
+        "normalise": table.basis.normalise,
+        "planning_time": table.basis.planning_time,
+        "scale": scale,
+        "maxima": maxima,
+    }
+
+
+def _calibration_facts(ranker: Ranker) -> Mapping[str, Any] | None:
+    known = ranker.calibration
+    if known is None:
+        return None
+    return {"grasps": known.grasps, "error": known.error}
+
+
+def pose_from_numbers(values: Sequence[float]) -> FloatArray:
+    """Pose of x, y, z [m] and a unit quaternion qw, qx, qy, qz, shape (4, 4).
+
+    Raises
+    ------
+    SettingsError
+        There are not seven numbers, or the quaternion is none.
+    """
+    pose = np.asarray(values, float)
+    norm = float(np.linalg.norm(pose[3:])) if pose.shape == (7,) else np.nan
+    if not (np.isfinite(pose).all() and abs(norm - 1.0) < 1e-2):
+        raise SettingsError(
+            "a frame pose is x y z [m] and a unit quaternion qw qx qy qz "
+            f"(got {pose.tolist()})"
+        )
+    return transform_from_parts(rotation_from_quaternion_wxyz(pose[3:]), pose[:3])
 
 
 def quadrant_ranks(
@@ -184,88 +302,3 @@ def _result(
         "orientation_wxyz": wxyz if reachable else None,
         **({"extrapolated": True} if far else {}),
     }
-
-
-QUADRANT_ORDER = ("NW", "NE", "SW", "SE", None)
-
-
-def cost_groups(
-    ranked: Sequence[RankedList],
-) -> dict[str, tuple[FloatArray, FloatArray]]:
-    """Terms of J of each quadrant, or of each list that names none.
-
-    Returns
-    -------
-    dict
-        From label to the terms in supplied order and in ranked order, shape (n, k);
-        a row of NaN is an unreachable grasp.
-    """
-    groups = {}
-    for one in ranked:
-        terms = np.stack([*one.terms().values()], axis=1)
-        for label, rows in _rows(one, several=len(ranked) > 1).items():
-            order = one.ranking.order
-            best_first = order[np.isin(order, rows)]
-            groups[label] = (terms[rows], terms[best_first])
-    return groups
-
-
-def _rows(one: RankedList, *, several: bool) -> dict[str, list[int]]:
-    """Rows of each quadrant; of the whole list if it names none."""
-    name = Path(one.grasps.source).stem if several else ""
-    quadrants = one.grasps.quadrants
-    if not any(quadrants):
-        return {name or "all": list(range(len(quadrants)))} if quadrants else {}
-    return {
-        f"{name} {quadrant or 'other'}".strip(): rows
-        for quadrant in QUADRANT_ORDER
-        if (rows := [row for row, own in enumerate(quadrants) if own == quadrant])
-    }
-
-
-def targets_of(sources: Sequence[str | Path], output: Path | None) -> list[Path]:
-    """Name the file of each list, or the one file of all.
-
-    Parameters
-    ----------
-    sources : sequence of path
-        The supplied lists.
-    output : Path or None
-        A folder takes ``NAME.ranked.json`` for each list; of several lists, a name
-        without suffix is a folder that is made. Any other name is one file.
-
-    Raises
-    ------
-    OutputError, SettingsError
-        The folder cannot be made, or two lists have the same name.
-    """
-    if output is None:
-        return []
-    if not is_folder(output) and (len(sources) == 1 or output.suffix):
-        return [output]
-    targets = [output / _ranked_name(source) for source in sources]
-    if len(set(targets)) < len(targets):
-        raise SettingsError(
-            "two lists have the same name; rank them one after the other"
-        )
-    make_folder(output)
-    return targets
-
-
-def _ranked_name(source: str | Path) -> str:
-    stem = "stdin" if str(source) == STDIN else Path(source).stem
-    return f"{stem.removesuffix('.ranked')}.ranked.json"
-
-
-def write_lists(
-    targets: Sequence[Path], texts: Sequence[str], *, overwrite: bool
-) -> None:
-    """Write each list to its file, or all to the one file there is."""
-    contents = texts if len(targets) == len(texts) else [joined(texts)]
-    for target, text in zip(targets, contents, strict=False):
-        publish(target, [text.encode("ascii")], overwrite=overwrite)
-
-
-def joined(texts: Sequence[str]) -> str:
-    """Return one JSON value: a document, or a list of several."""
-    return texts[0] if len(texts) == 1 else f"[{','.join(texts)}]\n"
