@@ -4,8 +4,8 @@
 what it chose; here the worst of seventeen poses counts: the pose itself and eight
 directions with either turn, in height too where nothing supports the bin. All poses are
 asked in the same way, with more points than ``place-bin`` takes for neighbours, every
-second orientation, and the checks that a map has, of which the search has a quarter:
-what it misses for want of checks is no worse case of the pose. Random poses are
+orientation, and the checks that a map has, of which the search has a quarter: what it
+misses for want of checks is no worse case of the pose. Random poses are
 feasible as the search means it: clear of all, on a support where the cell has one,
 within the camera's sight. One that scores less than the chosen pose's worst case has
 lost, as has one with such a neighbour; its figure then is an upper bound. Worst cases
@@ -32,7 +32,7 @@ from reachmap.maps.provenance import cell_of_artefact
 from reachmap.placement.decision import paper_pose
 from reachmap.placement.mapped.evaluator import open_evaluator
 from reachmap.placement.mapped.exact import SHARE_OF_CHECKS, Pose
-from reachmap.placement.mapped.sample import Grid
+from reachmap.placement.mapped.sample import DENSE, Grid
 from reachmap.placement.problem import PlacementProblem
 from reachmap.placement.tolerance import moved_by
 from reachmap.runtime.options import RunOptions
@@ -41,7 +41,7 @@ from reachmap.tools.place_bin import PlacementChoice, placed_bin
 from reachmap.tools.workspace_scan import workspace_scan
 
 QUIET = RunOptions(workers=1, quiet=True)
-GRID: Grid = (4, 3, 2)
+GRID: Grid = DENSE
 SEED, TRIES = 1, 4000
 SAME_POINTS = 0.05
 
