@@ -118,7 +118,8 @@ def compare(cell: str, overrides: Sequence[str], count: int, folder: Path) -> No
     worse, better = (gain <= -SAME_POINTS).sum(), (gain >= SAME_POINTS).sum()
     print(
         f"{name}: {where} on {stands}; worst case {own:.1f} %, told "
-        f"{placement.worst_score[placement.chosen]:.1f} %, paper's rule "
+        f"{placement.worst_score[placement.chosen]:.1f} ± "
+        f"{placement.score_error[placement.chosen]:.1f} %, paper's rule "
         f"{of_paper:.1f} %; of {len(others)} random poses {worse} are worse, {better} "
         f"better (best {max(others, default=np.nan):.1f} %), supports "
         f"{len(problem.supports)}, {evaluator.cpu_s:.0f} s",

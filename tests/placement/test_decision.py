@@ -16,6 +16,7 @@ from reachmap.placement.decision import (
     paper_pose,
     settle,
 )
+from reachmap.placement.drop_off_room import DropOffRoom
 from reachmap.placement.mapped.sample import open_frames
 from reachmap.placement.predicted.places import apart_m
 from reachmap.placement.predicted.region import Region
@@ -204,3 +205,19 @@ def test_a_bin_too_high_for_the_camera_is_a_clear_error():
     )
     with pytest.raises(SceneError, match=r"no scan config.*places; look elsewhere"):
         decide_by_search(asked, 2)
+
+
+def test_the_bin_keeps_out_of_the_drop_off(caplog):
+    """The summit is where parts are put down; a pose given there is warned of."""
+    part = "part={shape: {box: [0.04, 0.04, 0.06]}, pose: {xyz: [0, 0, 0.03]}}"
+    down = "pose: {xyz: [0.46, 0.2, 0.1], rpy_deg: [180, 0, 0]}"
+    drop_off = f"drop_off={{name: belt, frame: robot_base, {down}}}"
+    room = DropOffRoom(scene_of(UR5, part, drop_off, with_bin=False))
+    summit = (0.46, 0.2, 0.05, 0.6)
+    asked = dataclasses.replace(problem(hill(*summit)), drop_offs=room)
+    decision = decide_by_search(asked, 5)
+    best = decision.table.rows[decision.ranked[0]].pose
+    assert not room.taken(asked.T_base_bin(best))
+    assert "leaves no room at the drop-off belt" in asked.reason_against(summit)
+    decide_as_given(asked, summit)
+    assert "--bin-pose: the bin leaves no room at the drop-off belt" in caplog.text

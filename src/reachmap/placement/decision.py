@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import logging
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 
@@ -25,6 +26,8 @@ from reachmap.placement.scan_choice import FINALISTS, ScanChoice, choose_scan
 from reachmap.placement.steadying import stated_worst
 from reachmap.sampling.frames import approach_distance_m
 from reachmap.scans.ik_survey import survey_frames
+
+logger = logging.getLogger(__name__)
 
 NO_ROW = -1
 # Poses to look at, at most, once the pose of the bin is decided.
@@ -108,6 +111,9 @@ def decide_as_given(problem: PlacementProblem, pose: Pose) -> Decision:
     contact = problem.fit.contact(problem.T_base_bin(pose))
     if contact is not None:
         raise SceneError(f"--bin-pose: {contact.pair}")
+    taken = problem.without_drop_off(problem.T_base_bin(pose))
+    if taken:
+        logger.warning("--bin-pose: %s", taken)
     decision = Decision()
     paper = paper_pose(problem)
     poses = [pose] if paper is None or paper == pose else [pose, paper]

@@ -114,12 +114,18 @@ class PlacementProblem:
         contact = self.fit.contact(T_base_bin)
         if contact is not None:
             return contact.reason
-        if self.drop_offs is not None and (taken := self.drop_offs.taken(T_base_bin)):
-            return f"the bin leaves no room at the drop-off {taken}"
+        taken = self.without_drop_off(T_base_bin)
+        if taken:
+            return taken
         if self.still_camera is None:
             return ""
         seen = is_in_picture(self.loaded.cell, self.still_camera, T_base_bin)
         return "" if seen else OUT_OF_SIGHT
+
+    def without_drop_off(self, T_base_bin: FloatArray) -> str:
+        """Say which drop-off the bin leaves no room at, or ""."""
+        taken = "" if self.drop_offs is None else self.drop_offs.taken(T_base_bin)
+        return f"the bin leaves no room at the drop-off {taken}" if taken else ""
 
     def support(self, pose: Pose) -> str:
         """Name of the body that the bin stands on at a pose, "" where it floats."""
