@@ -34,7 +34,7 @@ from bench_bin_scan import PlainPlanner
 
 from reachmap._typing import FloatArray, IntArray
 from reachmap.cell.loading import read_cell
-from reachmap.cell.model.roadmap import RoadmapSpec
+from reachmap.cell.model.planner import RoadmapSpec
 from reachmap.core.planning.connection import Connection, connect
 from reachmap.core.planning.timing import execution_time_s, path_length_rad
 from reachmap.core.scene import Scene

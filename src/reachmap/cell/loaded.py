@@ -146,7 +146,7 @@ class LoadedCell:
         """
         cell = self.cell
         if bin_pose is not None:
-            cell = cell.with_bin_at(bin_pose, "robot_base")
+            cell = cell.with_spec_at(cell.bin, bin_pose, "robot_base")
             # Where it stands now is for the pose to say.
             free = cell.bin.model_copy(update={"on": None})
             cell = cell.model_copy(update={"bin": free})
@@ -230,7 +230,7 @@ def fingerprint(
     robot.pop("mount", None)
     del robot["xacro_args"], robot["joint_limits"], robot["group"]
     hashes = {name: f"sha256:{digest}" for name, digest in files_sha256.items()}
-    robot["urdf"] = sha256_text(_with_filenames(urdf, hashes, bare_names=True))
+    robot["urdf"] = sha256_text(_with_filenames(urdf, hashes))
     robot["srdf"] = sha256_text(srdf) if srdf else None
     meshes = [(body["name"], body["shape"]["mesh"]) for body in data["bodies"]]
     if (held := cell.held()) is not None:
@@ -261,19 +261,15 @@ def sha256_text(text: str) -> str:
     return hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()
 
 
-def _with_filenames(
-    urdf: str, names: Mapping[str, str], *, bare_names: bool = False
-) -> str:
+def _with_filenames(urdf: str, names: Mapping[str, str]) -> str:
     """URDF text whose ``filename`` attributes are replaced where ``names`` has them.
 
-    With ``bare_names`` the folders of all others are dropped.
+    The folders of all others are dropped.
     """
 
     def replace(match: re.Match[str]) -> str:
         given = unescape(match[3], {"&quot;": '"', "&apos;": "'"})
-        name = names.get(given)
-        if name is None and bare_names:
-            name = given.rsplit("/", 1)[-1]
-        return match[0] if name is None else f"{match[1]}={quoteattr(name)}"
+        name = names.get(given, given.rsplit("/", 1)[-1])
+        return f"{match[1]}={quoteattr(name)}"
 
     return re.sub(r"(\bfilename)(\s*=\s*[\"'])(.*?)[\"']", replace, urdf)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from reachmap._typing import FloatArray
-from reachmap.cell.model.tool import FREE
+from reachmap.cell.model.robot import FREE
 from reachmap.core.collision.bin_fit import misplaced_bins
 from reachmap.core.collision.bodies import (
     Load,

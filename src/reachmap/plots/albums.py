@@ -230,12 +230,10 @@ def placement_album(
     return [picture, Table(name="placement", text=_candidate_table(placement))]
 
 
-def comparison_album(
-    maps: MapChange, *, percent_map: PercentMap = "RdYlGn"
-) -> list[Picture | Table]:
+def comparison_album(maps: MapChange) -> list[Picture | Table]:
     """List the pictures of two maps: the level that changed most, then all levels."""
-    name, title, style = "comparison", maps.headline, {"percent_map": percent_map}
-    one = _picture(name, title, draw_comparison, maps, **style)
+    title = maps.headline
+    one = _picture("comparison", title, draw_comparison, maps)
     if maps.z.size == 1:
         return [one]
     return [one, _picture("comparison_overview", title, draw_change_sheet, maps)]

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from reachmap._typing import CodeArray, FloatArray, IntArray
-from reachmap.cell.model.tool import LISTED
+from reachmap.cell.model.robot import LISTED
 from reachmap.core.planning.timing import path_length_rad
 from reachmap.maps import BinMap, PathStore, RunInfo, Stamp, Status
 from reachmap.maps.parts import (

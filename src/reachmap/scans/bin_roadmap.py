@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from reachmap._typing import FloatArray, IntArray
-from reachmap.cell.model.tool import LISTED
+from reachmap.cell.model.robot import LISTED
 from reachmap.core.scene import Scene
 from reachmap.maps.parts import Components
 from reachmap.runtime.job import Stages

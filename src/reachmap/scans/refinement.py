@@ -17,7 +17,7 @@ import numpy as np
 
 from reachmap._typing import FloatArray, IntArray
 from reachmap.cell.model.cell import Cell
-from reachmap.cell.model.tool import FREE
+from reachmap.cell.model.robot import FREE
 from reachmap.core.scene import Scene
 from reachmap.geometry import (
     axis_rotations,

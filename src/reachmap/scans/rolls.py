@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from reachmap._typing import FloatArray, IntArray
-from reachmap.cell.model.tool import FREE, ToolSpec
+from reachmap.cell.model.robot import FREE, ToolSpec
 from reachmap.core.kinematics.windings import TURN_RAD
 from reachmap.geometry import AXES, axis_rotations
 from reachmap.maps.records import NO_PAIR, Status

@@ -12,7 +12,7 @@ import numpy as np
 
 from reachmap._typing import BoolArray, FloatArray
 from reachmap.cell.bins.support import TopFace, top_faces
-from reachmap.cell.model.tool import LISTED
+from reachmap.cell.model.robot import LISTED
 from reachmap.core.collision.bin_fit import BinFit
 from reachmap.core.collision.camera import Camera
 from reachmap.core.scene import Scene

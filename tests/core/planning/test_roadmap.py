@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from reachmap.cell.model.roadmap import RoadmapSpec
+from reachmap.cell.model.planner import RoadmapSpec
 from reachmap.core.kinematics.windings import Windings
 from reachmap.core.planning.candidates import CandidateMotions, UnionFind
 from reachmap.core.planning.connection import connect

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from reachmap.cell.model.roadmap import RoadmapSpec
+from reachmap.cell.model.planner import RoadmapSpec
 from reachmap.core.planning.motion import MotionChecker
 from reachmap.core.planning.routes import (
     RouteNetwork,

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from reachmap.cell.loading import read_cell
-from reachmap.cell.model.roadmap import RoadmapSpec
+from reachmap.cell.model.planner import RoadmapSpec
 from reachmap.core.kinematics.windings import TURN_RAD, Windings
 from reachmap.core.planning.candidates import NearestNeighbours
 from reachmap.core.planning.connection import connect

@@ -27,16 +27,21 @@ from reachmap.cell.model.fields import (
     Record,
 )
 from reachmap.cell.model.parameters import Parameters
-from reachmap.cell.model.planner import PlannerSpec
-from reachmap.cell.model.roadmap import RoadmapSpec
-from reachmap.cell.model.robot import IkSpec, JointLimits, Resources, RobotSpec, TcpSpec
+from reachmap.cell.model.planner import PlannerSpec, RoadmapSpec
+from reachmap.cell.model.robot import (
+    IkSpec,
+    JointLimits,
+    Resources,
+    RobotSpec,
+    TcpSpec,
+    ToolSpec,
+)
 from reachmap.cell.model.scans import (
     BinScanSpec,
     CubeSpec,
     PlacementSpec,
     WorkspaceScanSpec,
 )
-from reachmap.cell.model.tool import ToolSpec
 from reachmap.geometry import (
     inverse_transform,
     quaternion_wxyz_from_rotation,
@@ -234,10 +239,6 @@ class Cell(Record):
         R_world_grid = self.robot.base_pose.matrix()[:3, :3] @ T_base_grid[:3, :3]
         upright = transform_from_parts(upright_rotation(R_world_grid), np.zeros(3))
         return np.asarray(T_base_grid @ upright)
-
-    def with_bin_at(self, T_base_bin: FloatArray, frame: BaseOrWorld) -> Cell:
-        """Copy with another pose of the bin, written in a frame."""
-        return self.with_spec_at(self.bin, T_base_bin, frame)
 
     def with_spec_at(
         self, spec: BinSpec, T_base_bin: FloatArray, frame: BaseOrWorld

@@ -11,7 +11,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from reachmap.cell.model.fields import MAX_LENGTH_M, NAMES
-from reachmap.cell.model.tool import ROLLS
+from reachmap.cell.model.robot import ROLLS
 from reachmap.cell.text.yaml_reader import Document, Location
 
 

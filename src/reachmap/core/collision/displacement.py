@@ -36,14 +36,14 @@ class Extents:
         Geometry objects that joints of the chain carry.
     joint : int array, shape (bodies,)
         From 0.
-    centre, half : array, shape (bodies, 3)
-        Of the box [m].
+    low, high : array, shape (bodies, 3)
+        Its corners [m].
     """
 
     body: IntArray
     joint: IntArray
-    centre: FloatArray
-    half: FloatArray
+    low: FloatArray
+    high: FloatArray
 
     @classmethod
     def of(cls, chain: SerialChain, model: Any, bodies: BodyGeometry) -> Extents:
@@ -57,22 +57,30 @@ class Extents:
                 points = _corners(shape) @ body.placement.rotation.T
                 points = (points + body.placement.translation) @ frames[joint]
                 found.append((k, joint, points.min(axis=0), points.max(axis=0)))
-        low = np.array([row[2] for row in found]).reshape(-1, 3)
-        high = np.array([row[3] for row in found]).reshape(-1, 3)
         return cls(
             body=np.array([row[0] for row in found], np.int64),
             joint=np.array([row[1] for row in found], np.int64),
-            centre=(low + high) / 2,
-            half=(high - low) / 2,
+            low=np.array([row[2] for row in found]).reshape(-1, 3),
+            high=np.array([row[3] for row in found]).reshape(-1, 3),
         )
 
     def boxes(self, T_base_joint: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Low and high corners (n, bodies, 3) at joint frames (n, dof, 4, 4)."""
         T = T_base_joint[:, self.joint]
         R, origin = T[..., :3, :3], T[..., :3, 3]
-        middle = (R @ self.centre[..., None])[..., 0] + origin
-        room = (np.abs(R) @ self.half[..., None])[..., 0]
+        centre, half = (self.low + self.high) / 2, (self.high - self.low) / 2
+        middle = (R @ centre[..., None])[..., 0] + origin
+        room = (np.abs(R) @ half[..., None])[..., 0]
         return middle - room, middle + room
+
+    def corners_by_joint(self, dof: int) -> FloatArray:
+        """Corners of a box around all bodies of each joint, shape (dof, 3, 8)."""
+        corners = np.zeros((dof, 3, 8))
+        for k in np.unique(self.joint):
+            low = self.low[self.joint == k].min(axis=0)
+            high = self.high[self.joint == k].max(axis=0)
+            corners[k] = ((low + high) / 2 + box_corners(high - low)).T
+        return corners
 
 
 def _corners(shape: Solid) -> FloatArray:
@@ -93,8 +101,11 @@ def displacement_bounds(model: Any, bodies: BodyGeometry) -> FloatArray:
     """
     axes = [_axis(model, joint) for joint in range(1, model.njoints)]
     bounds = np.zeros((bodies.geometry.ngeoms, model.nv))
-    for row, (body, points) in zip(bounds, _bodies_corners(bodies), strict=True):
+    objects = bodies.geometry.geometryObjects
+    for row, body, shape in zip(bounds, objects, bodies.shapes, strict=True):
         if body.parentJoint > 0:
+            points = corner_points(shape) @ body.placement.rotation.T
+            points += body.placement.translation
             _fill_row(row, model, axes, body.parentJoint, points)
     return bounds
 
@@ -128,8 +139,8 @@ class MotionBound:
     ) -> None:
         self._chain = chain
         self._bounds, self._reach_m = bounds, reach_m
-        self._corners = _corners_by_joint(chain, robot.model, bodies)
         self._extents = Extents.of(chain, robot.model, bodies)
+        self._corners = self._extents.corners_by_joint(chain.dof)
         self.on_chain = self._extents.body
         parents = [g.parentJoint for g in bodies.geometry.geometryObjects]
         self._joint = np.array(parents, np.int64) - 1
@@ -205,39 +216,6 @@ class MotionBound:
         square += (uy + wz * x - wx * z) ** 2
         square += (uz + wx * y - wy * x) ** 2
         return np.asarray(np.sqrt(square.max(axis=2)))
-
-
-def _bodies_corners(bodies: BodyGeometry) -> list[tuple[Any, FloatArray]]:
-    """Each geometry object with the corners of its shape, in its joint's frame."""
-    return [
-        (
-            body,
-            corner_points(shape) @ body.placement.rotation.T
-            + body.placement.translation,
-        )
-        for body, shape in zip(
-            bodies.geometry.geometryObjects, bodies.shapes, strict=True
-        )
-    ]
-
-
-def _corners_by_joint(
-    chain: SerialChain, model: Any, bodies: BodyGeometry
-) -> FloatArray:
-    """Corners of a box around all bodies of each joint, shape (dof, 3, 8).
-
-    In the chain's joint frames, whose z is the joint axis.
-    """
-    frames = chain.joint_rotations(model)
-    corners = np.zeros((chain.dof, 3, 8))
-    placed = _bodies_corners(bodies)
-    for k in range(chain.dof):
-        points = [p @ frames[k] for body, p in placed if body.parentJoint == k + 1]
-        if points:
-            cloud = np.vstack(points)
-            low, high = cloud.min(axis=0), cloud.max(axis=0)
-            corners[k] = ((low + high) / 2 + box_corners(high - low)).T
-    return corners
 
 
 def _fill_row(

@@ -15,9 +15,8 @@ import numpy as np
 from eaik.pybindings import EAIK
 
 from reachmap._typing import BoolArray, FloatArray, IntArray
-from reachmap.core.kinematics.least_squares import least_squares_many
+from reachmap.core.kinematics.least_squares import least_squares_many, matrix_difference
 from reachmap.core.kinematics.nominal import NOMINAL_ARMS, rounded_arm
-from reachmap.core.kinematics.refine import matrix_difference
 from reachmap.core.kinematics.solutions import Rows, angular_distance
 from reachmap.core.robot.chain import SerialChain
 

@@ -4,6 +4,9 @@ What NumPy spends on a call is spread over a whole block: in every array the
 configuration is the last axis, so that each step of the arithmetic is one sweep over
 contiguous memory. A configuration's result does not depend on its neighbours. Numbers
 are of the kind that the starts are of: the first steps can do with single precision.
+
+Near singularities, where normal equations lose too much, singular values take their
+place.
 """
 
 from __future__ import annotations
@@ -17,6 +20,7 @@ from reachmap.core.robot.chain import (
     NEAR_HALF_TURN,
     SerialChain,
     axis_of_half_turn,
+    pose_error,
 )
 
 # Rows per block: its arrays, a few megabytes, nearly stay in the cache, and the last
@@ -29,6 +33,15 @@ _ZERO = 4e-16
 # A step that goes on for longer than this is cut [rad or m].
 _LARGEST_STEP = 0.5
 
+# A row that has not become ten times better in this many steps is given up.
+_PATIENCE = 15
+
+# With singular values: rows per block, so that Jacobians stay in the cache; a row is
+# done when it misses by no more than the tolerance [m and rad].
+_SINGULAR_BLOCK = 512
+_TOLERANCE = 1e-13
+_ITERATIONS = 30
+
 # Damping of a row that meets its goal, in units of the last place.
 _DAMPING = 50.0
 
@@ -40,7 +53,7 @@ def least_squares_many(
     *,
     tolerance: float,
     iterations: int,
-    patience: int = 15,
+    patience: int = _PATIENCE,
     limits: tuple[FloatArray, FloatArray] | None = None,
 ) -> tuple[FloatArray, FloatArray]:
     """Move configurations so that the TCP meets its goal.
@@ -255,3 +268,86 @@ def _error(R: list[FloatArray], p: FloatArray, goals: FloatArray) -> FloatArray:
         axis = axis_of_half_turn(np.moveaxis(D[:, :, far], -1, 0), v[:, far].T)
         error[3:, far] = axis.T * angle[far]
     return error
+
+
+def matrix_difference(T_goal: FloatArray, T: FloatArray) -> FloatArray:
+    """Bound how far poses miss their goals, the larger of [m] and [rad], shape (n,).
+
+    From above; near zero by less than twice the miss.
+    """
+    difference = (T_goal - T)[:, :3].reshape(len(T), 12)
+    # ‖ΔR‖_F = √2 · 2 sin(φ/2); the factor π/(2√2) bounds φ for all angles.
+    squares = np.einsum("ni,ni->n", difference, difference)
+    return np.asarray(np.sqrt(squares) * (np.pi / np.sqrt(8.0)))
+
+
+def refine_many(
+    chain: SerialChain, Q: FloatArray, T_goal: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Move configurations so that the TCP meets its goal, at singularities as well.
+
+    Singular values, several times as expensive as normal equations, do not square the
+    condition number: needed within about 1e-6 rad of a singularity.
+
+    Parameters
+    ----------
+    chain : SerialChain
+    Q : array, shape (n, dof)
+        Starts [rad].
+    T_goal : array, shape (n, 4, 4)
+        Goals T_base_tcp.
+
+    Returns
+    -------
+    Q : array, shape (n, dof)
+        Best configuration of each row.
+    residual : array, shape (n,)
+        What it misses by, the larger of [m] and [rad].
+    """
+    best, residual = Q.copy(), np.full(len(Q), np.inf)
+    for start in range(0, len(Q), _SINGULAR_BLOCK):
+        block = slice(start, start + _SINGULAR_BLOCK)
+        best[block], residual[block] = _refine_block(chain, Q[block], T_goal[block])
+    return best, residual
+
+
+def _refine_block(
+    chain: SerialChain, Q: FloatArray, T_goal: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    best, residual = Q.copy(), np.full(len(Q), np.inf)
+    milestone, waited = np.full(len(Q), np.inf), np.zeros(len(Q), int)
+    active, q = np.arange(len(Q)), Q
+    for count in range(_ITERATIONS + 1):
+        T, J = chain.jacobian_many(q)
+        error = pose_error(T_goal[active], T)
+        size = _size(error)
+        better = size < residual[active]
+        best[active[better]], residual[active[better]] = q[better], size[better]
+        progress = residual[active] < 0.1 * milestone[active]
+        milestone[active[progress]] = residual[active[progress]]
+        waited[active] = np.where(progress, 0, waited[active] + 1)
+        going = (size > _TOLERANCE) & (waited[active] < _PATIENCE)
+        if count == _ITERATIONS or not going.any():
+            break
+        active, dq = active[going], _damped_step(J[going], error[going])
+        longest = np.abs(dq).max(axis=1, initial=1e-300)
+        q = q[going] + dq * np.minimum(1.0, _LARGEST_STEP / longest)[:, None]
+    return best, residual
+
+
+def _damped_step_by_singular_values(J: FloatArray, error: FloatArray) -> FloatArray:
+    """Solve (JᵀJ + μI) dq = Jᵀe by singular values.
+
+    With μ proportional to the squared error the steps stay quadratically convergent
+    even where solutions form a curve and J has no full rank.
+    """
+    U, s, V_t = np.linalg.svd(J, full_matrices=False)
+    damping = 0.1 * (error * error).sum(1) + 1e-22
+    along = (np.swapaxes(U, 1, 2) @ error[:, :, None])[..., 0]
+    along *= s / (s * s + damping[:, None])
+    return np.asarray((np.swapaxes(V_t, 1, 2) @ along[:, :, None])[..., 0])
+
+
+def _size(error: FloatArray) -> FloatArray:
+    squares = error * error
+    return np.asarray(np.sqrt(np.maximum(squares[:, :3].sum(1), squares[:, 3:].sum(1))))

@@ -12,7 +12,7 @@ from collections.abc import Callable
 import numpy as np
 
 from reachmap._typing import FloatArray
-from reachmap.core.kinematics.refine import matrix_difference
+from reachmap.core.kinematics.least_squares import matrix_difference
 from reachmap.core.robot.chain import SerialChain
 from reachmap.geometry import transform_from_parts
 

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from reachmap._typing import BoolArray, FloatArray, IntArray
-from reachmap.cell.model.roadmap import RoadmapSpec
+from reachmap.cell.model.planner import RoadmapSpec
 from reachmap.core.kinematics.windings import TURN_RAD, Windings
 
 # Below it, starting the threads costs more than the queries.

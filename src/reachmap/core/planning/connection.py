@@ -18,8 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from reachmap._typing import BoolArray, FloatArray, IntArray
-from reachmap.cell.model.planner import PlannerSpec, SimplificationSpec
-from reachmap.cell.model.roadmap import RoadmapSpec
+from reachmap.cell.model.planner import PlannerSpec, RoadmapSpec, SimplificationSpec
 from reachmap.core.kinematics.windings import TURN_RAD, Windings
 from reachmap.core.planning.candidates import CandidateMotions
 from reachmap.core.planning.exploring import (

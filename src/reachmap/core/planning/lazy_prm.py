@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from reachmap._typing import FloatArray, IntArray
-from reachmap.cell.model.roadmap import RoadmapSpec
+from reachmap.cell.model.planner import RoadmapSpec
 from reachmap.core.kinematics.windings import TURN_RAD, Windings
 from reachmap.core.planning.candidates import NearestNeighbours
 from reachmap.core.planning.motion import MotionChecker

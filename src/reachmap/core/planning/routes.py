@@ -23,7 +23,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from reachmap._typing import FloatArray, IntArray
-from reachmap.cell.model.roadmap import RoadmapSpec
+from reachmap.cell.model.planner import RoadmapSpec
 from reachmap.core.memo import memoized_part
 from reachmap.core.planning.motion import MotionChecker
 from reachmap.core.planning.planner import Planner

@@ -13,8 +13,13 @@ import pinocchio as pin
 from reachmap._typing import FloatArray
 from reachmap.cell.files.urdf import FREE_JOINTS, MOVING
 from reachmap.cell.model.cell import JointLimits, RobotSpec
-from reachmap.core.robot.limits import LimitTable, merge_limits
-from reachmap.core.robot.urdf_joints import LINK_MARK, MimicJoint, UrdfJoints
+from reachmap.core.robot.joints import (
+    LINK_MARK,
+    LimitTable,
+    MimicJoint,
+    UrdfJoints,
+    merge_limits,
+)
 from reachmap.errors import SceneError
 
 TCP_FRAME = "reachmap_tcp"

@@ -26,7 +26,7 @@ from reachmap.core.robot.assembly import (
     reduced_model,
     with_followers,
 )
-from reachmap.core.robot.urdf_joints import read_urdf_joints
+from reachmap.core.robot.joints import read_urdf_joints
 from reachmap.errors import SceneError
 from reachmap.geometry import inverse_transform
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from reachmap._typing import BoolArray, FloatArray, IntArray
 from reachmap.cell.model.cell import Cell
-from reachmap.cell.model.roadmap import RoadmapSpec
+from reachmap.cell.model.planner import RoadmapSpec
 from reachmap.core.planning.approach import StraightApproach
 from reachmap.core.planning.connection import Connection, connect
 from reachmap.core.planning.roadmap import Goals

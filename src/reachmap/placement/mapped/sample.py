@@ -18,7 +18,7 @@ from scipy.spatial.transform import Rotation
 
 from reachmap._typing import BoolArray, FloatArray, IntArray
 from reachmap.cell.model.cell import Cell
-from reachmap.cell.model.tool import LISTED
+from reachmap.cell.model.robot import LISTED
 from reachmap.core.collision.bin_fit import ToolFit
 from reachmap.geometry import AXES, transform_from_parts
 from reachmap.sampling.frames import FrameGrid, bin_test_frames

@@ -11,7 +11,7 @@ from matplotlib.patches import Patch
 
 from reachmap._typing import FloatArray
 from reachmap.core.collision.solids import Solid, SolidCell
-from reachmap.plots.cell.cell_colours import BLOCKING, legend_colours, solid_colours
+from reachmap.plots.cell.cell_colours import legend_colours, solid_colours
 from reachmap.plots.cell.raster import (
     Facets,
     Window,
@@ -27,7 +27,6 @@ from reachmap.plots.parts.style import (
     axes_at,
     drawing,
     new_figure,
-    put_title,
 )
 
 # Bodies larger than this are cut at the edge of a picture instead of widening it [m].
@@ -36,7 +35,7 @@ MARGIN = 0.14
 PIXELS_PER_IN = 190.0
 ELEVATION_DEG = 24.0
 AZIMUTHS_DEG = (-40.0, 40.0, -65.0, 65.0)
-LEFT, GAP, TOP, RIGHT = 0.25, 0.62, 0.85, 0.20
+LEFT, GAP, TOP, RIGHT = 0.25, 0.62, 0.35, 0.20
 BIG_WIDEST, BIG_TALLEST = 5.6, 5.2
 SMALL_WIDEST = 3.6
 LEGEND_COLUMN = 1.45
@@ -69,26 +68,9 @@ def _extent(part: Facets) -> float:
 
 
 @drawing()
-def draw_cell(
-    cell: SolidCell,
-    q: FloatArray | None = None,
-    *,
-    title: str = "",
-    subtitle: str = "",
-    blocking: tuple[str, ...] = (),
-) -> Figure:
-    """Draw a cell at a configuration.
-
-    Parameters
-    ----------
-    cell : SolidCell
-    q : array, shape (dof,), optional
-        The scan configuration if left out [rad].
-    title, subtitle : str
-    blocking : tuple of str
-        Names of solids to be drawn in red.
-    """
-    placed = _placed(cell, cell.scan_configuration if q is None else q, blocking)
+def draw_cell(cell: SolidCell) -> Figure:
+    """Draw a cell at its scan configuration."""
+    placed = _placed(cell)
     points = placed.focus()
     big = _window(view_axes(_best_azimuth(placed, points), ELEVATION_DEG), points)
     top = _window(view_axes(-90.0, 90.0), points)
@@ -101,10 +83,10 @@ def draw_cell(
     small_in = min((max(big_height, 4.4) - GAP) / tall, SMALL_WIDEST / wide)
     height = max(big_height, small_in * tall + GAP)
     whole = LEFT + width + GAP + 0.15 + small_in * wide + RIGHT
-    handles = _handles(cell, blocking)
+    handles = _handles(cell)
     columns = max(2, int((whole - 2 * LEFT) / LEGEND_COLUMN))
     floor = 0.62 + 0.21 * -(-len(handles) // columns)
-    figure = new_figure(whole, floor + height + (TOP if title else 0.35))
+    figure = new_figure(whole, floor + height + TOP)
     axes = axes_at(figure, LEFT, floor + height - big_height, width, big_height)
     _show(axes, placed, big, big_in)
     axes.set_axis_off()
@@ -120,18 +102,15 @@ def draw_cell(
         _dimension(panel, name, vertical)
         bottom += height - small_in * _sides(top)[1]
     _put_legend(figure, handles, columns)
-    if title:
-        put_title(figure, LEFT, title, subtitle)
     return figure
 
 
-def _placed(cell: SolidCell, q: FloatArray, blocking: tuple[str, ...]) -> _Placed:
+def _placed(cell: SolidCell) -> _Placed:
     colours = solid_colours(cell.solids)
+    poses = cell.solid_poses(cell.scan_configuration)
     parts = []
-    for owner, (solid, T) in enumerate(
-        zip(cell.solids, cell.solid_poses(q), strict=True)
-    ):
-        rgb = BLOCKING if solid.name in blocking else colours[solid.name]
+    for owner, (solid, T) in enumerate(zip(cell.solids, poses, strict=True)):
+        rgb = colours[solid.name]
         parts.append(
             facets_of(solid.vertices, solid.triangles, T, np.array(rgb) / 255.0, owner)
         )
@@ -213,10 +192,8 @@ def _dimension(axes: Axes, name: str, vertical: str) -> None:
         spine.set_color(RULE)
 
 
-def _handles(cell: SolidCell, blocking: tuple[str, ...]) -> list[Patch]:
+def _handles(cell: SolidCell) -> list[Patch]:
     named = legend_colours(cell.solids)
-    if blocking:
-        named["in contact"] = BLOCKING
     return [
         Patch(
             facecolor=tuple(np.array(rgb) / 255.0),

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from reachmap._typing import BoolArray, FloatArray
-from reachmap.cell.model.tool import LISTED
+from reachmap.cell.model.robot import LISTED
 from reachmap.core.collision.bodies import LAIN_ON, ROOT, parts_of_bin
 from reachmap.core.collision.shapes import coal_shape
 from reachmap.core.collision.static_bodies import PlacedBodies, PlacedBody

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from reachmap._typing import IntArray
-from reachmap.cell.model.tool import LISTED
+from reachmap.cell.model.robot import LISTED
 from reachmap.maps.parts import StageStatus
 from reachmap.runtime.job import Stages
 from reachmap.runtime.progress import Progress

@@ -20,8 +20,7 @@ from reachmap.core.kinematics.closed_form import (
     ClosedForm,
     find_closed_form,
 )
-from reachmap.core.kinematics.least_squares import least_squares_many
-from reachmap.core.kinematics.refine import matrix_difference
+from reachmap.core.kinematics.least_squares import least_squares_many, matrix_difference
 from reachmap.core.kinematics.solutions import (
     Rows,
     can_be_within,
