@@ -76,6 +76,11 @@ def axis_rotations(axis: str, angles_rad: FloatArray) -> FloatArray:
     return R
 
 
+def transform_points(T: FloatArray, points: FloatArray) -> FloatArray:
+    """Points (..., 3) of a frame in another one, by its pose T there, (4, 4)."""
+    return np.asarray(points @ T[:3, :3].T + T[:3, 3])
+
+
 def inverse_transform(T: FloatArray) -> FloatArray:
     """Invert rigid transforms, shape (..., 4, 4)."""
     R_t = np.swapaxes(T[..., :3, :3], -1, -2)

@@ -12,6 +12,7 @@ from reachmap.geometry import (
     AXES,
     quaternion_wxyz_from_rotation,
     transform_from_parts,
+    transform_points,
 )
 from reachmap.sampling.lattice import Lattice, cube_lattice
 from reachmap.sampling.orientations import orientation_set, reference_rotation
@@ -133,7 +134,7 @@ def workspace_frames(cell: Cell) -> tuple[CubeFrames, ...]:
     for cube in spec.cubes:
         lattice = cube_lattice(cube, spec.z_step)
         frames = FrameGrid(
-            points=lattice.points() @ T_base_grid[:3, :3].T + T_base_grid[:3, 3],
+            points=transform_points(T_base_grid, lattice.points()),
             orientations=R_base_reference @ R_reference_tcp,
         )
         cubes.append(CubeFrames(name=cube.name, lattice=lattice, frames=frames))

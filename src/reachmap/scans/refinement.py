@@ -24,6 +24,7 @@ from reachmap.geometry import (
     inverse_transform,
     quaternion_wxyz_from_rotation,
     transform_from_parts,
+    transform_points,
 )
 from reachmap.maps.parts import Refinement
 from reachmap.maps.records import Status
@@ -157,7 +158,7 @@ class _Source:
         """Poses in robot_base, in the roll fixed by rule, at most (count, 4, 4)."""
         T_base_bin = self._T_base_bin
         points, axes = self._volume.draw(self._rng, count)
-        points = points @ T_base_bin[:3, :3].T + T_base_bin[:3, 3]
+        points = transform_points(T_base_bin, points)
         axes = axes @ T_base_bin[:3, :3].T
         if self._room is not None:
             every = np.ones(count, bool)

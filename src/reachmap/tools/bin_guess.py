@@ -17,6 +17,7 @@ from reachmap.geometry import (
     axis_vector,
     inverse_transform,
     transform_from_parts,
+    transform_points,
     yaw_transform,
 )
 from reachmap.maps.records import NO_PAIR, Status
@@ -214,7 +215,7 @@ class _Trial:
         xy = POINTS * np.array(cell.bin.inner[:2])
         p_bin = np.column_stack([xy, np.full(len(xy), frames.layer[0])])
         grid = FrameGrid(
-            points=p_bin @ T_base_bin[:3, :3].T + T_base_bin[:3, 3],
+            points=transform_points(T_base_bin, p_bin),
             orientations=frames.frames.orientations.copy(),
         )
         T = grid.transforms()

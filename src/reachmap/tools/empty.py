@@ -17,6 +17,7 @@ from reachmap.cell.model.cell import Cell
 from reachmap.cell.model.shapes import sides
 from reachmap.disk import as_path
 from reachmap.errors import SettingsError
+from reachmap.geometry import transform_points
 from reachmap.maps import BinMap, check_outputs, read_bin_map
 from reachmap.maps.bytes.publish import check_picture, publish_json
 from reachmap.picking.emptying import (
@@ -219,7 +220,7 @@ def part_costs(
     """
     T = bin_map.bin_pose
     ranking = ranker.rank(
-        heap.position @ T[:3, :3].T + T[:3, 3], -heap.normal @ T[:3, :3].T
+        transform_points(T, heap.position), -heap.normal @ T[:3, :3].T
     )
     dearest = float(ranking.cost[ranking.reachable].max(initial=0.0))
     cost = np.where(ranking.reachable, ranking.cost, dearest)

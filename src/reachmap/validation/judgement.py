@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from reachmap._typing import BoolArray, CodeArray, FloatArray, IntArray
+from reachmap.geometry import transform_points
 from reachmap.maps.parts import freeze
 from reachmap.maps.records import BinMap
 from reachmap.ranking.answers.ranked_list import QUADRANT_ORDER, RankedList
@@ -176,7 +177,7 @@ def _groups(ranked: RankedList, ranker: Ranker) -> dict[str, IntArray]:
     names = list(ranked.grasps.quadrants)
     if not any(names):
         T = ranker.table.T_bin_base
-        p_bin = ranked.queries.points @ T[:3, :3].T + T[:3, 3]
+        p_bin = transform_points(T, ranked.queries.points)
         names = [
             ("N" if y >= 0 else "S") + ("E" if x >= 0 else "W") for x, y, _ in p_bin
         ]

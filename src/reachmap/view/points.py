@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from reachmap._typing import BoolArray, CodeArray, FloatArray, IntArray
+from reachmap.geometry import transform_points
 from reachmap.maps.format.registry import Artefact
 from reachmap.maps.parts import freeze
 from reachmap.maps.records import BinMap, BinPlacement, Status, WorkspaceMap
@@ -171,7 +172,7 @@ def _workspace_points(record: WorkspaceMap) -> MapPoints:
     )
     z, level = np.unique(position[:, 2], return_inverse=True)
     return MapPoints(
-        position=_in_base(position, record.T_base_grid),
+        position=transform_points(record.T_base_grid, position),
         level=level.ravel(),
         levels=tuple(f"z = {name} m" for name in level_names(z)),
         shares=_shares(frames, len(position)),
@@ -212,17 +213,12 @@ def _placement_points(record: BinPlacement) -> MapPoints:
     np.fmax.at(best, place.ravel(), record.score)
     z, level = np.unique(position[:, 2], return_inverse=True)
     return MapPoints(
-        position=_in_base(position, record.T_base_level),
+        position=transform_points(record.T_base_level, position),
         level=level.ravel(),
         levels=tuple(f"z = {name} m" for name in level_names(z)),
         shares={"score": best},
         size_m=0.25 * _spacing(position),
     )
-
-
-def _in_base(points: FloatArray, T_base_own: FloatArray) -> FloatArray:
-    """Points (n, 3) of a map's own frame in robot_base."""
-    return np.asarray(points @ T_base_own[:3, :3].T + T_base_own[:3, 3])
 
 
 def shortest_paths(record: BinMap) -> IntArray:

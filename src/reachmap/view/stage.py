@@ -11,7 +11,7 @@ from reachmap._typing import CodeArray, FloatArray, IntArray
 from reachmap.cell.model.shapes import triangles_of
 from reachmap.core.collision.held_part import HeldPart
 from reachmap.core.collision.solids import Solid, SolidCell
-from reachmap.geometry import quaternion_wxyz_from_rotation
+from reachmap.geometry import quaternion_wxyz_from_rotation, transform_points
 from reachmap.plots.cell.cell_colours import BIN, BLOCKING, solid_colours
 from reachmap.plots.parts.style import NOT_ATTEMPTED, colour_map
 from reachmap.view.points import MapPoints
@@ -255,7 +255,7 @@ class Stage:
         poses = self.cell.solid_poses(self.cell.scan_configuration)
         corners = np.concatenate(
             [
-                solid.vertices @ T[:3, :3].T + T[:3, 3]
+                transform_points(T, solid.vertices)
                 for solid, T in zip(self.cell.solids, poses, strict=True)
                 if solid.kind != "body"
             ]

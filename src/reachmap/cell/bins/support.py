@@ -12,7 +12,7 @@ from reachmap.cell.model.cell import Cell
 from reachmap.cell.model.shapes import triangles_of
 from reachmap.cell.text.messages import did_you_mean
 from reachmap.cell.text.yaml_reader import Document, Location
-from reachmap.geometry import inverse_transform, tilt_rad
+from reachmap.geometry import inverse_transform, tilt_rad, transform_points
 
 # Points of a shape this far below its highest one still belong to its top face; a
 # bin that is this near to a top face stands on it.
@@ -73,7 +73,7 @@ def _top_face(body: BodySpec, T_to_parent: FloatArray) -> TopFace | None:
 
     points = triangles_of(body.shape).vertices
     T = T_to_parent @ body.pose.matrix()
-    points = points @ T[:3, :3].T + T[:3, 3]
+    points = transform_points(T, points)
     top = float(points[:, 2].max())
     flat = points[points[:, 2] > top - FLAT_M, :2]
     try:

@@ -14,7 +14,7 @@ import numpy as np
 
 from reachmap._typing import FloatArray, IntArray
 from reachmap.cell.meshes.polygons import MeshError, fan_triangles
-from reachmap.geometry import rotation_from_quaternion_wxyz
+from reachmap.geometry import rotation_from_quaternion_wxyz, transform_points
 
 Element = ElementTree.Element
 # A few nodes that name each other can ask for any number of copies.
@@ -42,7 +42,7 @@ def collada_triangles(data: bytes) -> tuple[FloatArray, IntArray]:
     vertices, triangles, count, total = [], [], 0, 0
     for T, geometry in document.instances():
         for points, corners in document.meshes(geometry):
-            vertices.append(points @ T[:3, :3].T + T[:3, 3])
+            vertices.append(transform_points(T, points))
             triangles.append(corners + count)
             count += len(points)
             total += len(corners)

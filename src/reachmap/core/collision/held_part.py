@@ -18,7 +18,7 @@ from reachmap.cell.model.shapes import (
     triangles_of,
 )
 from reachmap.errors import SceneError
-from reachmap.geometry import AXES
+from reachmap.geometry import AXES, transform_points
 
 if TYPE_CHECKING:
     from reachmap.cell.loading import LoadedCell
@@ -65,7 +65,7 @@ class HeldPart:
             return None
         key, spec = held
         solid, T = _solid(loaded, key, spec), spec.pose.matrix()
-        points = _hull_corners(triangles_of(solid).vertices @ T[:3, :3].T + T[:3, 3])
+        points = _hull_corners(transform_points(T, triangles_of(solid).vertices))
         column = AXES[loaded.cell.robot.tcp.approach_axis][0]
         is_round = _is_round_about(spec, T, column)
         if spec.yaw == "free" and not is_round:

@@ -12,7 +12,7 @@ from reachmap._typing import BoolArray, FloatArray
 from reachmap.cell.model.shapes import corner_points
 from reachmap.core.collision.bodies import BodyGeometry
 from reachmap.core.robot.model import RobotModel
-from reachmap.geometry import inverse_transform
+from reachmap.geometry import inverse_transform, transform_points
 
 if TYPE_CHECKING:
     from reachmap.cell.loading import LoadedCell
@@ -104,6 +104,6 @@ class MovableBodies:
         reach = [0.0]
         for k in np.flatnonzero(mask).tolist():
             T = self._bodies.geometry.geometryObjects[k].placement.homogeneous
-            points = corner_points(self._bodies.shapes[k]) @ T[:3, :3].T + T[:3, 3]
+            points = transform_points(T, corner_points(self._bodies.shapes[k]))
             reach.append(float(np.linalg.norm(points - origin, axis=1).max()))
         return max(reach)

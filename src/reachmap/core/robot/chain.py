@@ -17,7 +17,7 @@ import pinocchio as pin
 from reachmap._typing import BoolArray, FloatArray
 from reachmap.core.robot.assembly import TCP_FRAME
 from reachmap.core.robot.model import RobotModel
-from reachmap.geometry import inverse_transform, transform_from_parts
+from reachmap.geometry import inverse_transform, transform_from_parts, transform_points
 
 # Rows per block: the block's arrays, half a megabyte, stay in the cache.
 _BLOCK = 256
@@ -131,7 +131,7 @@ class SerialChain:
         moved = self.joint_frames_many(q)[0, joint] @ inverse_transform(T_base_joint)
         axes, points = self.axes_base.T.copy(), self.points_base
         axes[joint + 1 :] = axes[joint + 1 :] @ moved[:3, :3].T
-        points[joint + 1 :] = points[joint + 1 :] @ moved[:3, :3].T + moved[:3, 3]
+        points[joint + 1 :] = transform_points(moved, points[joint + 1 :])
         others = np.arange(self.dof) != joint
         return SerialChain.from_axes(
             axes[others],

@@ -14,7 +14,11 @@ from scipy.spatial import cKDTree
 from reachmap._typing import CodeArray, FloatArray, IntArray
 from reachmap.cell.model.fields import PoseSpec
 from reachmap.errors import SettingsError
-from reachmap.geometry import inverse_transform, rotation_from_quaternion_wxyz
+from reachmap.geometry import (
+    inverse_transform,
+    rotation_from_quaternion_wxyz,
+    transform_points,
+)
 from reachmap.maps.parts import freeze
 from reachmap.maps.records import BinMap, Status, WorkspaceMap
 
@@ -181,7 +185,7 @@ def _cube_parts(record: WorkspaceMap) -> Sequence[FrameTable]:
 def _in_world(part: FrameTable, record: WorkspaceMap | BinMap) -> FrameTable:
     """The same frames in the world; squares of a workspace are, too."""
     T = T_world_base_of(record)
-    position = part.position @ T[:3, :3].T + T[:3, 3]
+    position = transform_points(T, part.position)
     return dataclasses.replace(
         part,
         position=position,
@@ -216,7 +220,7 @@ def _bin_part(record: BinMap, frame: Frame) -> FrameTable:
     R = rotation_from_quaternion_wxyz(record.quaternion_wxyz.reshape(-1, 4))
     if frame == "bin":
         T_bin_base = inverse_transform(record.bin_pose)
-        position = position @ T_bin_base[:3, :3].T + T_bin_base[:3, 3]
+        position = transform_points(T_bin_base, position)
         R = T_bin_base[:3, :3] @ R
     z, y, x = np.meshgrid(record.layer, record.y, record.x, indexing="ij")
     square = np.stack([x, y, z], axis=-1).reshape(-1, 3).repeat(count, axis=0)

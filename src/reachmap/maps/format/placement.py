@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from reachmap.geometry import transform_points
 from reachmap.maps.bytes.tree import Tree
 from reachmap.maps.format.assembly import (
     assemble,
@@ -146,7 +147,7 @@ def tree_from_placement(record: BinPlacement) -> Tree:
     poses, T = np.reshape(record.candidate_pose, (-1, 4)), record.T_base_level
     arrays: dict[str, Any] = {name: getattr(record, name) for name in _ARRAYS}
     arrays.update(
-        candidate_position=poses[:, :3] @ T[:3, :3].T + T[:3, 3],
+        candidate_position=transform_points(T, poses[:, :3]),
         candidate_yaw=poses[:, 3],
         **of_reasons,
     )

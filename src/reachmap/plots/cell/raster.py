@@ -14,6 +14,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from reachmap._typing import BoolArray, FloatArray, IntArray
+from reachmap.geometry import transform_points
 
 SAMPLES = 2
 # Sides of the tiles in which small facets are drawn many at a time [pixels].
@@ -97,7 +98,7 @@ def facets_of(
         From 0 to 1.
     owner : int
     """
-    placed = vertices @ T[:3, :3].T + T[:3, 3]
+    placed = transform_points(T, vertices)
     corners = placed[triangles]
     area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     size = np.linalg.norm(area, axis=1)

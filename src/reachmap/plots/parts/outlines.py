@@ -24,7 +24,7 @@ from reachmap.cell.meshes.reading import read_mesh
 from reachmap.cell.model.cell import BinSpec, Cell
 from reachmap.cell.model.fields import CylinderShape, Shape
 from reachmap.cell.model.shapes import box_corners, triangles_of
-from reachmap.geometry import inverse_transform, yaw_transform
+from reachmap.geometry import inverse_transform, transform_points, yaw_transform
 from reachmap.plots.parts.style import BIN_COLOUR, INK
 
 Kind: TypeAlias = Literal[
@@ -107,7 +107,7 @@ def body_outlines(cell: Cell) -> tuple[Outline, ...]:
             continue
         points = triangles_of(body.shape).vertices
         T = frames[body.attach_to] @ body.pose.matrix()
-        found.append(hull_outline(body.name, "body", _moved(T, points)))
+        found.append(hull_outline(body.name, "body", transform_points(T, points)))
     for name, spec in cell.bins.items():
         T = T_level_base @ cell.T_base_of(spec)
         found += bin_outlines(spec, T, name=f"bin {name}", kind="body")
@@ -127,7 +127,9 @@ def bin_outlines(
         height = spec.inner[2] + spec.bottom_m
         points = box_corners(np.array([x, y, height]))
         points += np.array([0.0, 0.0, (spec.inner[2] - spec.bottom_m) / 2.0])
-        outlines.append(hull_outline(label, kind, _moved(T_level_bin, points)))
+        outlines.append(
+            hull_outline(label, kind, transform_points(T_level_bin, points))
+        )
     return tuple(outlines)
 
 
@@ -156,10 +158,6 @@ def margin_envelope(
         return ()
     points = np.concatenate(corners)
     return (hull_outline("margin", "envelope", points),)
-
-
-def _moved(T: FloatArray, points: FloatArray) -> FloatArray:
-    return np.asarray(points @ T[:3, :3].T + T[:3, 3])
 
 
 def draw_outline(axes: Axes, outline: Outline, *, weight: float = 1.0) -> None:
@@ -224,10 +222,14 @@ def base_outline(cell: Cell, urdf: str) -> Outline:
     points = _base_points(cell, urdf)
     T_level_base = inverse_transform(cell.T_base_level())
     if points is not None:
-        return _star_outline(_moved(T_level_base, points), T_level_base[:2, 3])
+        return _star_outline(
+            transform_points(T_level_base, points), T_level_base[:2, 3]
+        )
     spec = Shape(cylinder=CylinderShape(radius=NOMINAL_RADIUS, length=0.001))
     circle = triangles_of(spec).vertices
-    return hull_outline(f"{NAME} (origin)", "base", _moved(T_level_base, circle))
+    return hull_outline(
+        f"{NAME} (origin)", "base", transform_points(T_level_base, circle)
+    )
 
 
 def _star_outline(points: FloatArray, centre: FloatArray) -> Outline:
@@ -254,7 +256,9 @@ def _base_points(cell: Cell, urdf: str) -> FloatArray | None:
         robot = parse_urdf(urdf, "urdf")
         poses = robot.fixed_to(cell.robot.base_frame or robot.root)
         points = [
-            _moved(poses[item.link] @ item.origin.matrix(), _points_of(cell, item))
+            transform_points(
+                poses[item.link] @ item.origin.matrix(), _points_of(cell, item)
+            )
             for item in robot.collisions
             if item.link in poses
         ]

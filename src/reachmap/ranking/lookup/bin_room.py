@@ -25,6 +25,7 @@ from reachmap.geometry import (
     inverse_transform,
     rotation_between,
     rotation_from_quaternion_wxyz,
+    transform_points,
 )
 from reachmap.maps.records import BinMap
 from reachmap.ranking.lookup.matching import Queries
@@ -193,7 +194,7 @@ def _tool_hulls(cell: Mapping[str, Any]) -> Iterator[FloatArray]:
         corners = _corners_of(body["shape"])
         if corners is not None:
             T = T_tcp_link @ pose_matrix(body["pose"])
-            yield corners @ T[:3, :3].T + T[:3, 3]
+            yield transform_points(T, corners)
 
 
 def _corners_of(shape: Mapping[str, Any]) -> FloatArray | None:

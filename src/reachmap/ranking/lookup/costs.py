@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 
 from reachmap._typing import BoolArray, CodeArray, FloatArray, IntArray
 from reachmap.errors import SettingsError
+from reachmap.geometry import transform_points
 from reachmap.maps.parts import StageStatus, freeze
 from reachmap.ranking.lookup.matching import Matches, NearestPoints, Queries
 from reachmap.ranking.lookup.probability import orientation_kernel
@@ -236,7 +237,7 @@ def outside_map(points: FloatArray, nearest: IntArray, table: GraspTable) -> Boo
         Nearest test points.
     table : GraspTable
     """
-    p = points @ table.T_bin_base[:3, :3].T + table.T_bin_base[:3, 3]
+    p = transform_points(table.T_bin_base, points)
     sideways = np.hypot(*(p - table.bin_points[nearest])[:, :2].T)
     reach = 0.5 * float(np.hypot(*table.pitch)) + SIDEWAYS_TOLERANCE_M
     step = float(np.diff(table.layers).max(initial=0.0))
@@ -262,7 +263,7 @@ def unlike_map(
 
 def beyond_points(points: FloatArray, table: GraspTable) -> BoolArray:
     """Which grasps lie sideways of all test points, where costs extrapolate, (n,)."""
-    p = points @ table.T_bin_base[:3, :3].T + table.T_bin_base[:3, 3]
+    p = transform_points(table.T_bin_base, points)
     low, high = table.bin_points.min(axis=0), table.bin_points.max(axis=0)
     slack = MIN_DISTANCE_M
     return np.asarray(((p < low - slack) | (p > high + slack))[:, :2].any(axis=1))

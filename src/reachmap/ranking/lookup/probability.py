@@ -23,7 +23,7 @@ import numpy as np
 from reachmap._typing import BoolArray, FloatArray, IntArray
 from reachmap.disk import is_file, is_folder, is_there
 from reachmap.errors import MapFileError
-from reachmap.geometry import direction_angle
+from reachmap.geometry import direction_angle, transform_points
 from reachmap.maps.parts import freeze
 from reachmap.maps.records import Stamp
 from reachmap.ranking.lookup.matching import Queries, products
@@ -116,7 +116,7 @@ class Surroundings:
         The last is the square of the distance beyond the outermost points, in pitches.
         """
         table = self._table
-        p = points @ table.T_bin_base[:3, :3].T + table.T_bin_base[:3, 3]
+        p = transform_points(table.T_bin_base, points)
         pitches = (float(table.pitch.max()), float(table.pitch[1]), table.pitch[0])
         low, share, far = [], [], np.zeros(len(p))
         for axis, at, pitch in zip((2, 1, 0), self._coordinates, pitches, strict=True):

@@ -15,6 +15,7 @@ from reachmap.geometry import (
     direction_angle,
     inverse_transform,
     rotation_from_quaternion_wxyz,
+    transform_points,
 )
 from reachmap.maps.bytes.tree import canonical_array
 from reachmap.maps.parts import freeze
@@ -178,7 +179,7 @@ def table_from_bin_map(bin_map: BinMap, basis: CostBasis | None = None) -> Grasp
             (quaternion_angle(quaternions, quaternions[0]) < 1e-9).all()
         ),
         layers=bin_map.layer.copy(),
-        bin_points=points @ T_bin_base[:3, :3].T + T_bin_base[:3, 3],
+        bin_points=transform_points(T_bin_base, points),
         pitch=_pitch(bin_map),
         spacing_rad=np.array([_axis_spacing(axes), _turn_spacing(quaternions)]),
         T_bin_base=T_bin_base,
