@@ -8,8 +8,9 @@ import pytest
 from reachmap.cell.model.orientations import ConeFamily
 from reachmap.errors import SettingsError
 from reachmap.geometry import rotation_angle, rotation_from_quaternion_wxyz
+from reachmap.maps.parts import concatenated
 from reachmap.ranking import Ranker, RankSettings, grasps_from_document, rank_list
-from reachmap.validation.picks import join_picks, picks_of, tool_poses
+from reachmap.validation.picks import picks_of, tool_poses
 from reachmap.validation.random_grasps import random_grasps
 from tests.support.ranking_maps import make_bin_map
 
@@ -62,7 +63,7 @@ def test_a_fixed_roll_leaves_one_pose():
 def test_lists_keep_their_own_numbers():
     """Attempts are seeded by the place in the own list, whatever comes before it."""
     two = picks_of(ranked([DIRECTION, ORIENTED]))
-    joined = join_picks([two, two])
+    joined = concatenated([two, two])
     assert joined.number.tolist() == [0, 1, 0, 1]
     assert len(joined) == 4
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 import numpy as np
 
@@ -19,12 +20,24 @@ _CHECKS: Final = (0, 2_000, 5_000, 10_000, 20_000, 50_000, 80_000)
 _SHARE: Final = (0.0, 0.25, 0.55, 0.75, 0.89, 0.95, 0.99)
 
 
+Rows = TypeVar("Rows")
+
+
 def freeze(record: Any) -> None:
     """Make every array of a dataclass read-only (for ``__post_init__``)."""
     for item in dataclasses.fields(record):
         value = getattr(record, item.name)
         if isinstance(value, np.ndarray):
             value.setflags(write=False)
+
+
+def concatenated(parts: Sequence[Rows]) -> Rows:
+    """Dataclasses of arrays, one after another, as one."""
+    first: Any = parts[0]
+    names = [item.name for item in dataclasses.fields(first)]
+    rows = {n: np.concatenate([getattr(part, n) for part in parts]) for n in names}
+    whole: Rows = dataclasses.replace(first, **rows)
+    return whole
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -19,6 +19,7 @@ from reachmap.maps.parts import (
     Effort,
     Margins,
     Refinement,
+    concatenated,
     freeze,
 )
 from reachmap.maps.records import NO_PAIR
@@ -157,7 +158,7 @@ class GraspResults:
         return cls(
             **joined,
             place=np.concatenate(place),
-            cycle=CycleResults.join(cycles) if cycles else None,
+            cycle=concatenated(cycles) if cycles else None,
         )
 
 

@@ -31,7 +31,7 @@ from reachmap.scans.cycle.planning import CycleKnowledge, CyclePlan, CyclePlanne
 from reachmap.scans.cycle.results import CycleResults
 from reachmap.scans.cycle.scenes import CycleScenes, stages_of
 from reachmap.scans.cycle.stages import whole_cycles
-from reachmap.scans.document import cell_of_document, journal_settings
+from reachmap.scans.document import cell_of_document, journal_settings, tally
 from reachmap.scans.ik_survey import Survey
 from reachmap.scans.margins import MarginMeter
 from reachmap.scans.measured import MEASURED, Meter
@@ -343,12 +343,6 @@ def _status(survey: Survey, grasp: int, *, found: bool) -> int:
     if not len(survey.goals_of(grasp)):
         return int(survey.status[grasp])
     return Status.PATH_FOUND if found else Status.NO_PATH_FOUND
-
-
-def tally(payload: Mapping[str, Any]) -> tuple[int, int]:
-    """Path-reachable grasps, and all grasps, of a unit."""
-    status = payload["status"]
-    return int((status == Status.PATH_FOUND).sum()), len(status)
 
 
 def blank(document: Mapping[str, Any], unit: int, status: Status) -> dict[str, Any]:

@@ -8,7 +8,13 @@ from typing import Any
 
 from reachmap.cell.model.cell import Cell
 from reachmap.core.scene import Scene
-from reachmap.maps import Provenance, Stamp, collect_provenance, config_sha256
+from reachmap.maps import (
+    Provenance,
+    Stamp,
+    Status,
+    collect_provenance,
+    config_sha256,
+)
 
 
 def checking_settings(scene: Scene) -> dict[str, Any]:
@@ -101,3 +107,9 @@ def provenance_from_document(document: Mapping[str, Any]) -> Provenance:
     fields = dict(document["provenance"])
     fields["overrides"] = tuple(fields["overrides"])
     return Provenance(**fields)
+
+
+def tally(payload: Mapping[str, Any]) -> tuple[int, int]:
+    """Frames, or grasps, with a path, and all of them, of a unit."""
+    status = payload["status"]
+    return int((status == Status.PATH_FOUND).sum()), len(status)

@@ -16,15 +16,10 @@ from reachmap.core.scene import Scene
 from reachmap.maps import Status
 from reachmap.runtime.job import Job, Work, blocks
 from reachmap.sampling.frames import workspace_frames
-from reachmap.scans.document import journal_settings
+from reachmap.scans.document import journal_settings, tally
 from reachmap.scans.ik_survey import survey_frames
 from reachmap.scans.measured import attempt_seed
-from reachmap.scans.workspace_results import (
-    KIND,
-    FrameResults,
-    frames_of_cell,
-    tally,
-)
+from reachmap.scans.workspace_results import KIND, FrameResults, frames_of_cell
 
 if TYPE_CHECKING:
     from reachmap.cell.loading import LoadedCell

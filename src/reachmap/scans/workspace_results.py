@@ -20,7 +20,7 @@ from reachmap.maps import (
     workspace_map_from_cubes,
     write_workspace_map,
 )
-from reachmap.maps.parts import Components, freeze
+from reachmap.maps.parts import Components, concatenated, freeze
 from reachmap.runtime.job import Kind
 from reachmap.sampling.frames import CubeFrames, workspace_frames
 from reachmap.scans.document import cell_of_document, provenance_from_document
@@ -69,27 +69,11 @@ class FrameResults:
             goal_configuration=np.full((frames, dof), np.nan),
         )
 
-    @classmethod
-    def join(cls, parts: Sequence[FrameResults]) -> FrameResults:
-        """Results of consecutive frames, put together."""
-        return cls(
-            **{
-                name: np.concatenate([getattr(part, name) for part in parts])
-                for name in cls.__slots__
-            }
-        )
-
 
 def frames_of_cell(cell: Cell) -> int:
     """Number of test frames of a cell's workspace scan."""
     cubes = workspace_frames(cell)
     return sum(cube.frames.size for cube in cubes)
-
-
-def tally(payload: Mapping[str, Any]) -> tuple[int, int]:
-    """Frames with a path, and all frames, of a unit."""
-    status = payload["status"]
-    return int((status == Status.PATH_FOUND).sum()), len(status)
 
 
 def blank(document: Mapping[str, Any], unit: int, status: Status) -> dict[str, Any]:
@@ -116,7 +100,7 @@ def assemble(
     """
     parts = [dict(payload) for payload in payloads]
     evidence = parts[0].pop("components", None)
-    results = FrameResults.join([FrameResults(**part) for part in parts])
+    results = concatenated([FrameResults(**part) for part in parts])
     cell = cell_of_document(document)
     maps: dict[str, CubeMap] = {}
     begin = 0

@@ -18,9 +18,9 @@ from reachmap.runtime.job import Stages, Work
 from reachmap.runtime.journal import UNITS
 from reachmap.runtime.progress import Progress
 from reachmap.sampling.frames import workspace_frames
-from reachmap.scans.document import journal_settings
+from reachmap.scans.document import journal_settings, tally
 from reachmap.scans.ik_survey import MAX_COUNT, Survey, SurveyContext, survey_in_stages
-from reachmap.scans.workspace_results import KIND, FrameResults, frames_of_cell, tally
+from reachmap.scans.workspace_results import KIND, FrameResults, frames_of_cell
 
 
 def roadmap_work(scene: Scene, document: Mapping[str, Any]) -> Work:

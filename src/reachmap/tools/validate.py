@@ -15,6 +15,7 @@ from reachmap.disk import as_path
 from reachmap.errors import GraspListError, SettingsError
 from reachmap.maps import read_bin_map
 from reachmap.maps.bytes.publish import check_outputs, check_picture, publish_json
+from reachmap.maps.parts import concatenated
 from reachmap.maps.provenance import cell_of_artefact
 from reachmap.maps.records import BinMap
 from reachmap.ranking.answers.ranked_list import (
@@ -39,7 +40,7 @@ from reachmap.validation.cycle_planning import CycleResults, plan_cycles
 from reachmap.validation.cycles import judge_cycles, settings_in_j
 from reachmap.validation.facts import facts_of
 from reachmap.validation.judgement import JudgedList, judge_list
-from reachmap.validation.picks import NO_PICKS, join_picks, picks_of
+from reachmap.validation.picks import NO_PICKS, picks_of
 from reachmap.validation.planning import PickContext, PickResults, plan_picks
 from reachmap.validation.random_grasps import random_grasps
 from reachmap.validation.routes import plan_picks_over_routes
@@ -208,7 +209,7 @@ def _with_picks(context: PickContext, ranked: Sequence[RankedList]) -> PickConte
     GraspListError
         There are none.
     """
-    picks = join_picks([picks_of(one) for one in ranked])
+    picks = concatenated([picks_of(one) for one in ranked])
     if not len(picks):
         raise GraspListError("there are no grasps to plan to")
     pairs = tuple(pairs_of_fillings(context.loaded))

@@ -61,16 +61,6 @@ def picks_of(ranked: RankedList) -> Picks:
     )
 
 
-def join_picks(parts: list[Picks]) -> Picks:
-    """Put the picks of several lists one after another."""
-    return Picks(
-        **{
-            name: np.concatenate([getattr(part, name) for part in parts])
-            for name in Picks.__slots__
-        }
-    )
-
-
 def tool_poses(picks: Picks, row: int, *, rolls: int, approach_axis: str) -> FloatArray:
     """Tool poses of one grasp: one if its roll is fixed, else one for each roll.
 

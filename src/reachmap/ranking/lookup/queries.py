@@ -25,6 +25,7 @@ from reachmap.geometry import (
     rotation_from_quaternion_wxyz,
     rotation_from_rpy_deg,
     transform_from_parts,
+    transform_points,
 )
 from reachmap.maps.records import BinMap
 from reachmap.ranking.lists.arrays import GraspList
@@ -91,7 +92,7 @@ def place_grasps(
         grasps,
         frame="robot_base",
         T_frame_bin=None,
-        points=grasps.points @ R.T + T[:3, 3],
+        points=transform_points(T, grasps.points),
         directions=grasps.directions @ R.T,
         rotations=tcp_rotation(R @ grasps.rotations, grasps.approach_axis, tcp_axis),
         approach_axis=tcp_axis,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -181,7 +182,9 @@ def table_from_bin_map(bin_map: BinMap, basis: CostBasis | None = None) -> Grasp
         layers=bin_map.layer.copy(),
         bin_points=transform_points(T_bin_base, points),
         pitch=_pitch(bin_map),
-        spacing_rad=np.array([_axis_spacing(axes), _turn_spacing(quaternions)]),
+        spacing_rad=np.array(
+            [_spacing(axes, direction_angle), _spacing(quaternions, quaternion_angle)]
+        ),
         T_bin_base=T_bin_base,
         bin_pose=bin_map.bin_pose.copy(),
         approach_axis=bin_map.approach_axis,
@@ -299,18 +302,11 @@ def _pitch(bin_map: BinMap) -> FloatArray:
     return np.array([np.diff(c).max() if c.size > 1 else side for c, side in sides])
 
 
-def _axis_spacing(axes: FloatArray) -> float:
-    """Greatest angle from an approach axis of the first point to its nearest other."""
-    angles = direction_angle(axes[0][:, None], axes[0][None])
-    return _greatest_gap(angles)
-
-
-def _turn_spacing(quaternions: FloatArray) -> float:
-    angles = quaternion_angle(quaternions[0][:, None], quaternions[0][None])
-    return _greatest_gap(angles)
-
-
-def _greatest_gap(angles: FloatArray) -> float:
+def _spacing(
+    orientations: FloatArray, angle: Callable[[FloatArray, FloatArray], FloatArray]
+) -> float:
+    """Greatest angle from an orientation of the first point to its nearest other."""
+    angles = angle(orientations[0][:, None], orientations[0][None])
     others = np.where(angles > SAME_AXIS_RAD, angles, np.inf).min(axis=1)
     gap = float(others.max())
     return gap if np.isfinite(gap) else float(np.pi)

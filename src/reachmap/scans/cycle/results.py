@@ -68,16 +68,6 @@ class CycleResults:
             lift_above_rim=np.full(grasps, np.nan),
         )
 
-    @classmethod
-    def join(cls, parts: Sequence[CycleResults]) -> CycleResults:
-        """Results of consecutive grasps, put together."""
-        return cls(
-            **{
-                name: np.concatenate([getattr(part, name) for part in parts])
-                for name in cls.__slots__
-            }
-        )
-
     def section(
         self, stages: Sequence[str], attempted: BoolArray, shaped: Callable[[Any], Any]
     ) -> Cycle:
