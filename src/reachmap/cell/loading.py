@@ -13,19 +13,19 @@ from reachmap.cell.bins.shorthand import (
     write_out_carriers,
     write_out_fill,
 )
-from reachmap.cell.bins.support import with_bins_on_supports
+from reachmap.cell.bins.support import with_standing_bins
 from reachmap.cell.files.files import compare_hashes, read_files, stored_files
 from reachmap.cell.files.resources import shipped_folder
 from reachmap.cell.loaded import SUFFIXES, LoadedCell, fingerprint
 from reachmap.cell.model.cell import Cell
-from reachmap.cell.mounting import (
-    check_bins_stand,
-    leaning_levels,
-    write_out_mount,
-)
 from reachmap.cell.pick_cycle import check_part_choice
 from reachmap.cell.references import check_names, find_warnings
-from reachmap.cell.resolution import resolved_cell, validated
+from reachmap.cell.resolution import (
+    leaning_levels,
+    resolved_cell,
+    validated,
+    write_out_mount,
+)
 from reachmap.cell.text.expressions import resolve_expressions, restore_expressions
 from reachmap.cell.text.messages import did_you_mean
 from reachmap.cell.text.overrides import apply_overrides
@@ -220,8 +220,7 @@ def cell_from_json(
         check_names(document, files.robot, files.srdf_description)
     compare_hashes(document, files, files_sha256 or {})
     if changes:
-        check_bins_stand(document, cell)
-        cell = with_bins_on_supports(document, cell)
+        cell = with_standing_bins(document, cell)
     document.raise_mistakes()
     return LoadedCell(
         cell=cell,

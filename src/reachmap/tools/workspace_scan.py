@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from reachmap.cell.loading import LoadedCell, read_cell
-from reachmap.cell.mounting import leaning_levels
+from reachmap.cell.resolution import leaning_levels
 from reachmap.core.scene import Scene
 from reachmap.errors import SettingsError
 from reachmap.maps import Status, WorkspaceMap

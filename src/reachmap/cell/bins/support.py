@@ -1,4 +1,4 @@
-"""Supports of bins: the horizontal top faces of static bodies."""
+"""How bins stand: upright, on the horizontal top faces of static bodies."""
 
 from __future__ import annotations
 
@@ -12,13 +12,19 @@ from reachmap.cell.model.cell import Cell
 from reachmap.cell.model.shapes import triangles_of
 from reachmap.cell.text.messages import did_you_mean
 from reachmap.cell.text.yaml_reader import Document, Location
-from reachmap.geometry import inverse_transform, tilt_rad, transform_points
+from reachmap.geometry import (
+    inverse_transform,
+    tilt_rad,
+    transform_points,
+)
 
 # Points of a shape this far below its highest one still belong to its top face; a
 # bin that is this near to a top face stands on it.
 FLAT_M, TOUCH_M = 5e-4, 5e-3
 SLACK_M = 1e-6
 STEADY_DEG = 0.1
+# Parts slide out of a bin long before; it is a bin that was meant to stand.
+MAX_BIN_TILT_DEG = 75.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -109,12 +115,14 @@ def support_of(spec: BinSpec, T_to_bin: FloatArray, faces: tuple[TopFace, ...]) 
     return next(under, "")
 
 
-def with_bins_on_supports(document: Document, cell: Cell) -> Cell:
+def with_standing_bins(document: Document, cell: Cell) -> Cell:
     """The cell with each bin placed on the body that its ``on`` names, if any.
 
-    Mistakes are added to the document where the body has no level top face, the bin
-    does not fit on it, or leans.
+    Mistakes are added to the document where a bin stands on its side or its head in
+    the world, and where the body has no level top face, the bin does not fit on it, or
+    leans.
     """
+    _check_tilts(document, cell)
     for place, spec in cell.every_bin():
         if spec.on is None:
             continue
@@ -165,3 +173,24 @@ def _on_support(
         return None
     T_world_bin[2, 3] = faces[0].z + spec.bottom_m
     return np.asarray(T_base_world @ T_world_bin)
+
+
+def _check_tilts(document: Document, cell: Cell) -> None:
+    T_world_base = inverse_transform(cell.T_base_world())
+    leans = tilt_rad(T_world_base[:3, :3]) > 0
+    for place, spec in cell.every_bin():
+        T_world_bin = T_world_base @ cell.T_base_of(spec)
+        tilt = float(np.degrees(tilt_rad(T_world_bin[:3, :3])))
+        if tilt <= MAX_BIN_TILT_DEG:
+            continue
+        hint = (
+            "robot_base itself is tilted, so give the pose in the world with "
+            f"{'.'.join(place)}.frame: world"
+            if leans and spec.frame == "robot_base"
+            else "its z axis must point up"
+        )
+        document.add(
+            (*place, "pose"),
+            f"the bin is tilted {tilt:.0f} deg from upright in the world and would "
+            f"spill (allowed: {MAX_BIN_TILT_DEG:g}); {hint}",
+        )
