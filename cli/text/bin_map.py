@@ -10,10 +10,10 @@ from reachmap.cli.text.tables import fact_lines, table_lines
 from reachmap.maps.summary.bin import (
     MEASURES,
     BinSummary,
+    ClearanceShare,
     RefinementSummary,
     Spread,
 )
-from reachmap.maps.summary.clearance import ClearanceShare
 from reachmap.maps.summary.directions import ReachedShares
 from reachmap.maps.summary.emptying import Emptying
 from reachmap.maps.summary.evidence import EvidenceSummary

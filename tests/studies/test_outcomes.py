@@ -8,7 +8,7 @@ import pytest
 from reachmap.errors import SettingsError
 from reachmap.maps.records import Status
 from reachmap.maps.study.record import OBJECTIVES
-from reachmap.maps.summary.clearance import clearance_shares
+from reachmap.maps.summary.bin import clearance_shares
 from reachmap.maps.summary.emptying import emptying_of
 from reachmap.runtime.options import RunOptions
 from reachmap.studies.assembly import best_rows

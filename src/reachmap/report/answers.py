@@ -7,7 +7,7 @@ import numpy as np
 from reachmap.maps.cycle.summary import summarise_cycle
 from reachmap.maps.study.record import Study
 from reachmap.maps.study.words import changes_text, sentence
-from reachmap.maps.summary.clearance import clearance_shares
+from reachmap.maps.summary.bin import clearance_shares
 from reachmap.maps.summary.directions import reached_shares
 from reachmap.maps.summary.emptying import emptying_of
 from reachmap.maps.summary.placement import summarise_placement

@@ -23,7 +23,7 @@ from reachmap.maps import (
 from reachmap.maps.base.format import read_base
 from reachmap.maps.cycle.summary import summarise_cycle
 from reachmap.maps.provenance import cell_of_artefact
-from reachmap.maps.summary.clearance import clearance_shares
+from reachmap.maps.summary.bin import clearance_shares
 from reachmap.runtime.job import Work
 from reachmap.runtime.options import IN_PROCESS, RunOptions
 from reachmap.runtime.run import run_scan

@@ -10,7 +10,7 @@ import pytest
 from reachmap.cli.text.info import info_text
 from reachmap.maps import write_bin_map
 from reachmap.maps.parts import Margins
-from reachmap.maps.summary.clearance import clearance_shares
+from reachmap.maps.summary.bin import clearance_shares
 from reachmap.tools.info import info
 from tests.support.synthetic_maps import synthetic_bin_map
 

@@ -10,7 +10,6 @@ import numpy as np
 from reachmap._typing import BoolArray, FloatArray
 from reachmap.maps.cycle.summary import CycleSummary, summarise_cycle
 from reachmap.maps.records import BinMap, Status
-from reachmap.maps.summary.clearance import ClearanceShare, clearance_shares
 from reachmap.maps.summary.directions import ReachedShares, reached_shares
 from reachmap.maps.summary.emptying import Emptying, emptying_of
 from reachmap.maps.summary.evidence import EvidenceSummary, evidence_of
@@ -23,6 +22,39 @@ from reachmap.maps.summary.statistics import (
     causes_of,
     saturation_of,
 )
+
+# The usual safety margin, what a bin that is put down by hand is off by, and what one
+# on a pallet is.
+STEPS_M = (0.002, 0.005, 0.010)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ClearanceShare:
+    """Test grasps whose best path keeps a clearance.
+
+    Attributes
+    ----------
+    clearance_m : float
+    frames : float
+        Share of the test grasps [percent].
+    """
+
+    clearance_m: float
+    frames: float
+
+
+def clearance_shares(record: BinMap) -> tuple[ClearanceShare, ...]:
+    """Share of test grasps by clearance of their best path; empty if unknown."""
+    tried = int(attempted(record).sum())
+    if record.margins is None or not tried:
+        return ()
+    clearance = np.nan_to_num(record.margins.clearance, nan=-1.0)
+    return tuple(
+        ClearanceShare(
+            clearance_m=step, frames=100.0 * int((clearance >= step).sum()) / tried
+        )
+        for step in STEPS_M
+    )
 
 
 @dataclass(frozen=True, slots=True)
