@@ -58,6 +58,12 @@ def axis_vector(axis: str) -> FloatArray:
     return vector
 
 
+def approach_directions(R: FloatArray, approach_axis: str) -> FloatArray:
+    """Where the tool points: (..., 3, 3) orientations to (..., 3) unit vectors."""
+    axis, sign = AXES[approach_axis]
+    return np.asarray(sign * R[..., :, axis])
+
+
 def axis_rotations(axis: str, angles_rad: FloatArray) -> FloatArray:
     """Rotations about a signed axis, shape (n, 3, 3).
 

@@ -11,7 +11,7 @@ from matplotlib.patches import FancyArrowPatch, Polygon
 from scipy.stats import binomtest
 
 from reachmap.cell.model.orientations import ConeFamily
-from reachmap.geometry import yaw_transform
+from reachmap.geometry import approach_directions, yaw_transform
 from reachmap.maps.records import Status
 from reachmap.maps.summary.directions import reached_shares
 from reachmap.maps.summary.statistics import causes_of, saturation_of, wilson_interval
@@ -27,7 +27,7 @@ from reachmap.plots.curves.saturation import draw_saturation
 from reachmap.plots.parts.bin_view import percent_after
 from reachmap.plots.parts.squares import whole_percent
 from reachmap.plots.placement import draw_placement, placement_titles
-from reachmap.sampling.orientations import approach_directions, orientation_set
+from reachmap.sampling.orientations import orientation_set
 from tests.support.optional import present
 from tests.support.ranking_maps import make_bin_map
 from tests.support.synthetic_maps import (

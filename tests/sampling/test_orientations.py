@@ -7,13 +7,9 @@ from hypothesis import strategies as st
 
 from reachmap.cell.loading import read_cell
 from reachmap.cell.model.orientations import ConeFamily, ListFamily
-from reachmap.geometry import rotation_angle, rotation_from_rpy_deg
+from reachmap.geometry import approach_directions, rotation_angle, rotation_from_rpy_deg
 from reachmap.ranking.lookup.queries import align
-from reachmap.sampling.orientations import (
-    approach_directions,
-    orientation_set,
-    straight_down_orientation,
-)
+from reachmap.sampling.orientations import orientation_set, straight_down_orientation
 
 AXES = ["+x", "-x", "+y", "-y", "+z", "-z"]
 

@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from reachmap._typing import CodeArray, FloatArray, IntArray
-from reachmap.geometry import rotation_from_quaternion_wxyz
+from reachmap.geometry import approach_directions, rotation_from_quaternion_wxyz
 from reachmap.maps.records import BinMap, Status
 from reachmap.maps.summary.statistics import STATUS_NAMES
 from reachmap.plots.parts.bin_view import frame_bin, view_of
@@ -32,7 +32,6 @@ from reachmap.plots.parts.style import (
     put_title,
     subtitle_of,
 )
-from reachmap.sampling.orientations import approach_directions
 
 # Pale blue for what works, so that what does not stands out; blue against yellow to
 # dark red differs in every kind of colour vision, and the causes run light to dark.

@@ -9,7 +9,7 @@ import numpy as np
 from reachmap._typing import FloatArray, IntArray
 from reachmap.cell.model.cell import Cell
 from reachmap.geometry import (
-    AXES,
+    approach_directions,
     quaternion_wxyz_from_rotation,
     transform_from_parts,
     transform_points,
@@ -196,9 +196,9 @@ def below_rim_m(cell: Cell) -> float:
 def _steepness(cell: Cell) -> FloatArray:
     """Rise of each orientation's approach, backwards, along the bin's z."""
     T_base_bin = cell.T_base_bin()
-    column, sign = AXES[cell.robot.tcp.approach_axis]
     R_base_tcp = bin_test_frames(cell, T_base_bin).frames.orientations
-    return np.asarray(-sign * R_base_tcp[:, :, column] @ T_base_bin[:3, 2])
+    forwards = approach_directions(R_base_tcp, cell.robot.tcp.approach_axis)
+    return np.asarray(-forwards @ T_base_bin[:3, 2])
 
 
 def cell_centres(side: float, count: int) -> FloatArray:

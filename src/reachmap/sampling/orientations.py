@@ -93,12 +93,6 @@ def straight_down_orientation(approach_axis: str) -> FloatArray:
     return R + 0.0
 
 
-def approach_directions(R: FloatArray, approach_axis: str) -> FloatArray:
-    """Where the tool points: (..., 3, 3) orientations to (..., 3) unit vectors."""
-    axis, sign = AXES[approach_axis]
-    return np.asarray(sign * R[..., :, axis])
-
-
 def _tilt_rotation(tilt_deg: float, azimuth_deg: float) -> FloatArray:
     """Smallest rotation from straight down to the tilted direction, (3, 3).
 

@@ -20,6 +20,7 @@ from reachmap.cell.model.cell import Cell
 from reachmap.cell.model.robot import FREE
 from reachmap.core.scene import Scene
 from reachmap.geometry import (
+    approach_directions,
     axis_rotations,
     inverse_transform,
     quaternion_wxyz_from_rotation,
@@ -33,7 +34,6 @@ from reachmap.ranking.lookup.matching import Queries
 from reachmap.ranking.lookup.queries import complete_rotation
 from reachmap.runtime.job import Job, Stages, blocks
 from reachmap.sampling.frames import approach_distance_m, bin_test_frames
-from reachmap.sampling.orientations import approach_directions
 from reachmap.sampling.regression import GraspRegression
 from reachmap.sampling.volume import GraspVolume
 from reachmap.scans.bin_roadmap import lengths_over_roadmap

@@ -12,6 +12,7 @@ from scipy.spatial import cKDTree
 from scipy.stats import t as student
 
 from reachmap._typing import BoolArray, FloatArray
+from reachmap.geometry import approach_directions
 from reachmap.maps.comparison.pose_matching import (
     TOLERANCE_DEG,
     TOLERANCE_M,
@@ -25,7 +26,6 @@ from reachmap.maps.comparison.significance import (
 from reachmap.maps.records import BinMap, Status, WorkspaceMap
 from reachmap.maps.study.record import LOWER_IS_BETTER, MEANS, PATH_LENGTH
 from reachmap.maps.summary.directions import (
-    approach_direction,
     reachability_of_directions,
 )
 from reachmap.maps.summary.emptying import volume_left
@@ -120,7 +120,7 @@ def of_bin(record: BinMap) -> dict[str, Outcomes]:
     table = frame_table(record, "bin")
     hit = table.status == Status.PATH_FOUND
     place = table.position / TOLERANCE_M
-    axis = _directions(table, record.approach_axis) / SMALL_TURN
+    axis = approach_directions(table.rotation, record.approach_axis) / SMALL_TURN
     frame = np.column_stack([place, _turns(table)])
     found = {
         "bin_reachability": _share(frame, hit),
@@ -170,11 +170,6 @@ def _emptied(record: BinMap) -> dict[str, Outcomes]:
 
 def _turns(table: FrameTable) -> FloatArray:
     return np.asarray(table.rotation.reshape(-1, 9) / (np.sqrt(2.0) * SMALL_TURN))
-
-
-def _directions(table: FrameTable, approach_axis: str) -> FloatArray:
-    identity = np.array([1.0, 0.0, 0.0, 0.0])
-    return np.asarray(table.rotation @ approach_direction(identity, approach_axis))
 
 
 def _any(key: FloatArray, hit: BoolArray) -> tuple[FloatArray, BoolArray]:

@@ -11,7 +11,7 @@ from reachmap._typing import FloatArray
 from reachmap.core.kinematics.kinematics import Kinematics
 from reachmap.core.robot.model import RobotModel
 from reachmap.core.scene import Scene
-from reachmap.geometry import AXES
+from reachmap.geometry import approach_directions
 
 # 2000 random configurations find a free share of 0.2 % in 98 of 100 cases.
 SAMPLES = 2000
@@ -141,11 +141,10 @@ def best_view(
     if not len(rows):
         return None
     T = scene.kinematics.forward_many(Q[rows])
-    column, sign = AXES[axis]
     over = T[:, :3, 3] - scene.T_base_bin[:3, 3]
     off_centre = np.linalg.norm(over[:, :2], axis=1) / reach_m
     height = np.abs(over[:, 2] / reach_m - 0.5)
-    downwards = -sign * T[:, 2, column]
+    downwards = -approach_directions(T[:, :3, :3], axis)[:, 2]
     effort = np.abs(Q[rows]).mean(axis=1) / np.pi
     best = int(np.argmax(downwards - off_centre - height - effort))
     return int(rows[best]), float(downwards[best])

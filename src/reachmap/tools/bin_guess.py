@@ -13,7 +13,7 @@ from reachmap.core.collision.bin_fit import BinFit
 from reachmap.core.collision.solids import SolidCell
 from reachmap.core.scene import Scene
 from reachmap.geometry import (
-    AXES,
+    approach_directions,
     axis_vector,
     inverse_transform,
     transform_from_parts,
@@ -276,10 +276,11 @@ def _free(scene: Scene, T_base_tip: FloatArray) -> BoolArray:
 
 def _near_poses(scene: Scene, T_base_tcp: FloatArray, xyz_m: Place) -> int:
     """Number of poses that are near a place with the tool pointing down."""
-    axis, sign = AXES[scene.loaded.cell.robot.tcp.approach_axis]
+    axis = scene.loaded.cell.robot.tcp.approach_axis
+    downwards = -approach_directions(T_base_tcp[:, :3, :3], axis)[:, 2]
     apart_m = np.linalg.norm(T_base_tcp[:, :3, 3] - xyz_m, axis=1)
     near = apart_m < NEAR * reach_of(T_base_tcp[:, :3, 3])
-    return int((near & (-sign * T_base_tcp[:, 2, axis] > DOWN)).sum())
+    return int((near & (downwards > DOWN)).sum())
 
 
 def _places(points: FloatArray) -> Iterator[tuple[Place, float]]:

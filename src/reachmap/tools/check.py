@@ -13,7 +13,7 @@ from reachmap.cell.bins.support import support_of, top_faces
 from reachmap.cell.loading import LoadedCell, read_cell
 from reachmap.cell.model.shapes import shape_text
 from reachmap.core.scene import Scene
-from reachmap.geometry import AXES, inverse_transform, tilt_rad
+from reachmap.geometry import approach_directions, inverse_transform, tilt_rad
 from reachmap.placement.mapped.imaging import picture_of
 from reachmap.sampling.frames import approach_distance_m, below_rim_m
 from reachmap.scans.cycle.cell_checks import cycle_warnings
@@ -126,7 +126,7 @@ def check_loaded(loaded: LoadedCell) -> CellCheck:
     scene = Scene.build(loaded)
     cell, robot = loaded.cell, scene.robot
     T_base_tcp = scene.kinematics.forward(scene.scan_configuration)
-    column, sign = AXES[cell.robot.tcp.approach_axis]
+    axis = cell.robot.tcp.approach_axis
     return CellCheck(
         name=cell.name,
         source=loaded.source,
@@ -135,9 +135,9 @@ def check_loaded(loaded: LoadedCell) -> CellCheck:
         base_frame=robot.base_frame,
         base_tilt_deg=round(float(np.degrees(tilt_rad(robot.T_world_base[:3, :3]))), 4),
         tcp_parent=cell.robot.tcp.parent,
-        approach_axis=cell.robot.tcp.approach_axis,
+        approach_axis=axis,
         tcp_at_scan_m=_rounded(T_base_tcp[:3, 3]),
-        approach_at_scan=_rounded(sign * T_base_tcp[:3, column]),
+        approach_at_scan=_rounded(approach_directions(T_base_tcp[:3, :3], axis)),
         ik_method=scene.kinematics.method,
         ik_complete=scene.kinematics.complete,
         ik_approximation=scene.kinematics.approximation,

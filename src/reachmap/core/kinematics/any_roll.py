@@ -12,7 +12,7 @@ from reachmap._typing import FloatArray
 from reachmap.core.kinematics.solutions import Rows, distinct
 from reachmap.core.kinematics.solvers.choice import FULL_AXES, Arm, choose_solver
 from reachmap.core.robot.chain import SerialChain
-from reachmap.geometry import AXES
+from reachmap.geometry import AXES, approach_directions
 
 # Sine of the angle between two axes that are one: what rounded angles explain.
 ALONG = 1e-4
@@ -30,11 +30,11 @@ class AnyRollSolver:
     """
 
     def __init__(self, arm: Arm, axis: str) -> None:
-        chain, (column, sign) = arm.chain, AXES[axis]
+        chain = arm.chain
         T = chain.tcp_at_zero
         longer = Arm(
             chain=SerialChain.from_axes(
-                np.vstack([chain.axes_base.T, sign * T[:3, column]]),
+                np.vstack([chain.axes_base.T, approach_directions(T[:3, :3], axis)]),
                 np.vstack([chain.points_base, T[:3, 3]]),
                 T,
                 np.append(chain.is_revolute, True),

@@ -7,17 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from reachmap._typing import BoolArray, FloatArray, IntArray
-from reachmap.geometry import AXES, rotation_from_quaternion_wxyz
+from reachmap.geometry import approach_directions, rotation_from_quaternion_wxyz
 from reachmap.maps.records import BinMap, Status
 
 # Axes of one direction differ by rounding alone; families keep degrees apart.
 _SAME_DIRECTION = 1e-6
-
-
-def approach_direction(quaternion_wxyz: FloatArray, approach_axis: str) -> FloatArray:
-    """Direction of a TCP axis, as in "+z": shape (..., 4) to (..., 3)."""
-    column, sign = AXES[approach_axis]
-    return sign * rotation_from_quaternion_wxyz(quaternion_wxyz)[..., column]
 
 
 def same_direction(quaternion_wxyz: FloatArray, approach_axis: str) -> IntArray:
@@ -34,7 +28,8 @@ def same_direction(quaternion_wxyz: FloatArray, approach_axis: str) -> IntArray:
     int array, shape (no,)
         0, 1, …; equal for rolls about one axis.
     """
-    axes = approach_direction(quaternion_wxyz, approach_axis)
+    R = rotation_from_quaternion_wxyz(quaternion_wxyz)
+    axes = approach_directions(R, approach_axis)
     apart = np.linalg.norm(axes[:, None] - axes[None], axis=-1)
     first = (apart < _SAME_DIRECTION).argmax(axis=1)
     return np.unique(first, return_inverse=True)[1].astype(np.int64)

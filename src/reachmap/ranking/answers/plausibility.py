@@ -14,7 +14,7 @@ from typing import Final
 import numpy as np
 
 from reachmap.geometry import (
-    AXES,
+    approach_directions,
     quaternion_wxyz_from_rotation,
     rotation_from_quaternion_wxyz,
     yaw_transform,
@@ -131,12 +131,11 @@ def _reordered(grasps: GraspList) -> GraspList:
         turn[row] = ("quaternion_wxyz" in grasp) - ("quaternion_xyzw" in grasp)
     rotations = grasps.rotations.copy()
     directions = grasps.directions.copy()
-    index, sign = AXES[grasps.approach_axis]
     for way in (1, -1):
         rows = grasps.has_rotation & (turn == way)
         wxyz = quaternion_wxyz_from_rotation(rotations[rows])
         rotations[rows] = rotation_from_quaternion_wxyz(np.roll(wxyz, way, axis=-1))
-        directions[rows] = sign * rotations[rows][:, :, index]
+        directions[rows] = approach_directions(rotations[rows], grasps.approach_axis)
     return replace(grasps, directions=directions, rotations=rotations)
 
 

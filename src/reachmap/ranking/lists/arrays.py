@@ -10,7 +10,7 @@ import numpy as np
 
 from reachmap._typing import BoolArray, FloatArray
 from reachmap.geometry import (
-    AXES,
+    approach_directions,
     rotation_from_quaternion_wxyz,
     transform_from_parts,
 )
@@ -90,10 +90,10 @@ def arrays_from_document(
     axis = document.get("approach_axis", "+z")
     rotations = _rotations(grasps)
     has_rotation = np.isfinite(rotations[:, 0, 0])
-    index, sign = AXES[axis]
     outward = document.get("direction_convention", "approach") == "outward_normal"
     given = _directions(grasps) * (-1.0 if outward else 1.0)
-    directions = np.where(has_rotation[:, None], sign * rotations[:, :, index], given)
+    own = approach_directions(rotations, axis)
+    directions = np.where(has_rotation[:, None], own, given)
     bin_pose = document.get("bin_pose")
     return GraspList(
         document=document,

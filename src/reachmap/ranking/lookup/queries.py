@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from reachmap._typing import BoolArray, FloatArray
 from reachmap.errors import GraspListError, MapFileError, SettingsError
 from reachmap.geometry import (
-    AXES,
+    approach_directions,
     axis_vector,
     inverse_transform,
     quaternion_wxyz_from_rotation,
@@ -210,8 +210,8 @@ def align(R: FloatArray, directions: FloatArray, tcp_axis: str) -> FloatArray:
     -------
     array, shape (n, 3, 3)
     """
-    index, sign = AXES[tcp_axis]
-    return np.asarray(rotation_between(sign * R[..., :, index], directions) @ R)
+    own = approach_directions(R, tcp_axis)
+    return np.asarray(rotation_between(own, directions) @ R)
 
 
 # Printed matrices have three decimals.
