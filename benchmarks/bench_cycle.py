@@ -38,7 +38,7 @@ from reachmap.cell.loaded import LoadedCell  # noqa: E402
 from reachmap.core.planning.routes import shorten_until  # noqa: E402
 from reachmap.core.scene import Scene  # noqa: E402
 from reachmap.maps import BinMap, Status, read_bin_map  # noqa: E402
-from reachmap.maps.parts import StageStatus  # noqa: E402
+from reachmap.maps.parts import StageStatus, concatenated  # noqa: E402
 from reachmap.maps.provenance import cell_of_artefact  # noqa: E402
 from reachmap.ranking import Ranker, RankSettings, rank_list  # noqa: E402
 from reachmap.runtime.options import IN_PROCESS, RunOptions  # noqa: E402
@@ -52,7 +52,7 @@ from reachmap.scans.cycle.scenes import (  # noqa: E402
 from reachmap.tools.bin_scan import bin_scan  # noqa: E402
 from reachmap.validation.cycle_planning import plan_cycles  # noqa: E402
 from reachmap.validation.cycles import judge_cycles, summarise_cycles  # noqa: E402
-from reachmap.validation.picks import join_picks, picks_of  # noqa: E402
+from reachmap.validation.picks import picks_of  # noqa: E402
 from reachmap.validation.planning import PickContext  # noqa: E402
 from reachmap.validation.random_grasps import random_grasps  # noqa: E402
 from tests.support.cycle_replay import Replay, faults_of  # noqa: E402
@@ -194,7 +194,7 @@ def against_fresh_plans(record: BinMap, count: int, seed: int) -> None:
     ranked = [rank_list(one, ranker) for one in drawn]
     context = PickContext(
         loaded=cell_of_artefact(record.provenance, "map", ()),
-        picks=join_picks([picks_of(one) for one in ranked]),
+        picks=concatenated([picks_of(one) for one in ranked]),
         rolls=ROLLS,
         repeats=1,
         seed=seed,
