@@ -77,12 +77,12 @@ def _without_names(document: Document, wanted: str | None) -> None:
             one = "left: {carrier: KLT-4147, pose: …}"
             document.add(("bins",), f"expected at least one bin by name, as in {one}")
             data["bins"] = {}
-        data["bin"], data[CHOICE] = stand_in(), None
+        data["bin"], data[CHOICE] = _stand_in(), None
     elif wanted is not None:
         document.add((CHOICE,), f"the cell has no bins by name (got {wanted!r})")
 
 
-def stand_in() -> dict[str, Any]:
+def _stand_in() -> dict[str, Any]:
     """Some size for a bin that has none, so that this is the only mistake."""
     return {"inner": [1.0, 1.0, 1.0]}
 
@@ -265,4 +265,4 @@ def _write_out_carrier(document: Document, place: Location) -> None:
 def _give_size(tray: dict[str, Any]) -> None:
     """Give a bin of unknown carrier some size, so that this is the only mistake."""
     if tray.get("inner") is None:
-        tray.update(stand_in())
+        tray.update(_stand_in())
