@@ -140,7 +140,7 @@ def test_levels_are_written_out_as_layers():
     [
         (["bin_scan.fill=[0.5, 0.5]"], "levels must rise strictly"),
         (["bin_scan.fill=[1.5]"], r"bin_scan\.fill\.0: expected a number <= 1"),
-        (["bin_scan.fill_heights_m=[0.05]"], r"the bin is 0\.04 deep"),
+        (["bin_scan.fill_heights_m=[0.05]"], r"the bin is 0\.04 m deep"),
         ([TOY_FILL, "bin_scan.fill_heights_m=[0.01]"], "give fill or fill_heights_m"),
         (["bin_scan.fill=[]"], r"bin_scan\.fill: expected at least 1 value"),
     ],
