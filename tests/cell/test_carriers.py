@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from reachmap.cell.bins.shorthand import carriers, find_carrier
+from reachmap.cell.bins.carriers import carriers, find_carrier
 from reachmap.cell.loading import cell_from_json, cell_from_text, read_cell
 from reachmap.cli import group
 from reachmap.errors import CellError

@@ -7,12 +7,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from reachmap.cell.bins.shorthand import (
-    gather_bins,
-    write_out_bins,
-    write_out_carriers,
-    write_out_fill,
-)
+from reachmap.cell.bins.carriers import write_out_carriers
+from reachmap.cell.bins.shorthand import gather_bins, write_out_bins, write_out_fill
 from reachmap.cell.bins.support import with_standing_bins
 from reachmap.cell.files.files import compare_hashes, read_files, stored_files
 from reachmap.cell.files.resources import shipped_folder

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from typing import Any
 
-from reachmap.cell.bins.shorthand import carriers
+from reachmap.cell.bins.carriers import carriers
 
 
 def list_carriers() -> tuple[dict[str, Any], ...]:
