@@ -11,9 +11,10 @@ from reachmap.cell.files.collisions import mesh_scales
 from reachmap.cell.files.moveit_config import find_moveit_config
 from reachmap.cell.files.planning_scene import SceneBody, read_scene
 from reachmap.cell.files.resources import SCHEME, NotFoundError, Resolver
-from reachmap.cell.files.robot_text import Expansion, robot_text
+from reachmap.cell.files.robot_text import robot_text
 from reachmap.cell.files.srdf import SrdfDescription, parse_srdf
 from reachmap.cell.files.urdf import UrdfDescription, parse_urdf
+from reachmap.cell.files.xacro import Expansion
 from reachmap.cell.text.messages import did_you_mean
 from reachmap.disk import is_folder
 from reachmap.errors import SettingsError

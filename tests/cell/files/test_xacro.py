@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from reachmap.cell.files import robot_text
+from reachmap.cell.files import xacro as xacro_files
 from reachmap.cell.files.resources import Resolver
-from reachmap.cell.files.robot_text import expand_xacro
+from reachmap.cell.files.xacro import expand_xacro
 from reachmap.errors import CellError
 
 pytest.importorskip("xacro")
@@ -106,7 +106,7 @@ def test_an_expression_that_never_ends_is_stopped(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """No signal handler runs inside one power of integers; the process is ended."""
-    monkeypatch.setattr(robot_text, "LIMIT_CPU_S", 1)
+    monkeypatch.setattr(xacro_files, "LIMIT_CPU_S", 1)
     path = write(tmp_path / "arm.xacro", '<link name="${9**9**9}"/>')
     with pytest.raises(CellError, match="stopped after 1 s of computing"):
         expanded(path)
@@ -116,7 +116,7 @@ def test_a_text_beyond_memory_is_stopped(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Memory has an end, too."""
-    monkeypatch.setattr(robot_text, "LIMIT_BYTES", 500_000_000)
+    monkeypatch.setattr(xacro_files, "LIMIT_BYTES", 500_000_000)
     path = write(tmp_path / "arm.xacro", "<link name=\"${'a'*10**9}\"/>")
     with pytest.raises(CellError, match=r"or 0\.5 GB"):
         expanded(path)

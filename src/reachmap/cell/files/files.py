@@ -12,9 +12,10 @@ from reachmap.cell.bins.shorthand import bin_places
 from reachmap.cell.files.collisions import mesh_scales
 from reachmap.cell.files.joint_limits import MoveItLimits, parse_joint_limits
 from reachmap.cell.files.resources import NotFoundError, Resolver
-from reachmap.cell.files.robot_text import Expansion, robot_text
+from reachmap.cell.files.robot_text import robot_text
 from reachmap.cell.files.srdf import SrdfDescription, parse_srdf
 from reachmap.cell.files.urdf import UrdfDescription, parse_urdf
+from reachmap.cell.files.xacro import Expansion
 from reachmap.cell.meshes.reading import MeshError, read_mesh
 from reachmap.cell.model.shapes import sides
 from reachmap.cell.pick_cycle import part_places
