@@ -187,6 +187,7 @@ def _origin_lines(info: ArtefactInfo) -> list[str]:
     settings = (f"{key}={text}" for key, text in flat_json(provenance.settings))
     facts = [
         ("cell", f"{info.cell_name or '?'}, contents {stamp.cell_sha256[:12]}"),
+        ("bin", info.bin_name),
         ("overrides", ", ".join(provenance.overrides)),
         ("seed", str(stamp.seed)),
         ("source", provenance.source_sha256[:12]),

@@ -201,6 +201,19 @@ def test_bins_that_are_none_are_one_mistake(tmp_path, bins, message):
     assert len(caught.value.lines) == 1
 
 
+def test_a_mesh_in_millimetres_is_noticed_in_every_bin(two, tmp_path):
+    """Not only in the bin that is picked from."""
+    trimesh = pytest.importorskip("trimesh")
+    trimesh.creation.box((300, 200, 50)).export(tmp_path / "tray.stl")
+    for name in ("left", "right"):
+        with pytest.raises(
+            CellError, match="300 m large; is it in millimetres"
+        ) as told:
+            read_cell(two, [f"bins.{name}.mesh={{file: tray.stl}}"])
+        assert len(told.value.lines) == 1
+        read_cell(two, [f"bins.{name}.mesh={{file: tray.stl, scale: 0.001}}"])
+
+
 def test_names_must_be_free(tmp_path):
     """A bin is not called like a body."""
     path = write(tmp_path, f"bins:\n  floor: {LEFT}\n  pedestal: {RIGHT}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -13,6 +14,8 @@ from reachmap.cli import group
 from reachmap.geometry import inverse_transform
 from reachmap.maps import read_bin_map, read_placement
 from reachmap.maps.provenance import cell_of_artefact
+from reachmap.plots.placement import draw_placement
+from reachmap.tools.info import info
 from reachmap.tools.workspace_scan import workspace_scan
 
 SPEC = "{inner: [0.2, 0.12, 0.04], wall: 0.01, pose: {xyz: [%s, 0.35, -0.2]}}"
@@ -90,6 +93,18 @@ def test_each_bin_has_a_place_beside_the_other(folder):
     for name in ("a", "b"):
         np.testing.assert_allclose(poses["a"][name], poses["b"][name], atol=1e-9)
     assert are_apart(*(corners(cell.bin, poses["a"][name]) for name in ("a", "b")))
+
+
+def test_what_is_said_of_a_placement_names_its_bin(folder):
+    """In `info` and in the title of the picture; a workspace map is of no bin."""
+    for name in ("a", "b"):
+        path = folder / f"placement-{name}.h5"
+        assert info(path).facts()["bin"] == name
+        assert re.search(rf"^  bin +{name}$", run("info", path).stdout, re.MULTILINE)
+        figure = draw_placement(read_placement(path))
+        titles = [text.get_text() for text in figure.texts]
+        assert any(text.endswith(f"planar-toy, bin {name}") for text in titles)
+    assert info(folder / "workspace.h5").facts()["bin"] is None
 
 
 def test_a_bin_by_name_is_placed_where_the_other_stands(folder, tmp_path):

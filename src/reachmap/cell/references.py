@@ -251,22 +251,30 @@ def find_warnings(document: Document, cell: Cell, files: CellFiles) -> tuple[str
         elif (side := float(sides(body.shape).max())) > LARGE_M:
             warnings.append(_large(document, location, f"body {body.name!r}", side))
     warnings += _part_warnings(document, cell, files)
-    where: Location = ("bin", "inner")
-    if max(cell.bin.inner) > LARGE_M:
-        warnings.append(_large(document, where, "the bin", max(cell.bin.inner)))
-    if cell.bin.mesh is not None:
-        key, scale = body_key("bin", cell.bin.mesh.file), cell.bin.mesh.factors
-        where = ("bin", "mesh")
-        warnings += _mesh_warnings(
-            document, files, key, "mesh of the bin", scale, where
-        )
+    warnings += _bin_warnings(document, cell, files)
     if files.robot is not None:
         warnings += _links_unchecked(document, cell, files.robot)
         for name, scale in mesh_scales(files.robot.collisions).items():
             label = f"URDF mesh {name.rsplit('/', 1)[-1]!r}"
-            where = ("robot", "urdf")
-            warnings += _mesh_warnings(document, files, name, label, scale, where)
+            location = ("robot", "urdf")
+            warnings += _mesh_warnings(document, files, name, label, scale, location)
     return tuple(warnings)
+
+
+def _bin_warnings(document: Document, cell: Cell, files: CellFiles) -> list[str]:
+    warnings = []
+    for place, spec in cell.every_bin():
+        which = "the bin" if place == ("bin",) else f"bin {place[-1]!r}"
+        if (side := max(spec.inner)) > LARGE_M:
+            warnings.append(_large(document, (*place, "inner"), which, side))
+        if spec.mesh is None:
+            continue
+        key = body_key(
+            "bin" if place == ("bin",) else f"bin {place[-1]}", spec.mesh.file
+        )
+        label, scale, where = f"mesh of {which}", spec.mesh.factors, (*place, "mesh")
+        warnings += _mesh_warnings(document, files, key, label, scale, where)
+    return warnings
 
 
 def _part_warnings(document: Document, cell: Cell, files: CellFiles) -> list[str]:

@@ -123,7 +123,7 @@ def draw_placement(
     _put_legend(figure, [*handles, *legend_lines(stack.shown(level))], bottom - 0.55)
     _write_text(figure, placement, left, bottom - (0.75 if count == 2 else 1.70))
     title, subtitle = placement_titles(placement)
-    put_title(figure, LEFT, title, f"{subtitle} · {context.name}".rstrip(" ·"))
+    put_title(figure, LEFT, title, f"{subtitle} · {context.bin_name}".rstrip(" ·"))
     return figure
 
 

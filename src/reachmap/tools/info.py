@@ -8,10 +8,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeAlias
 
+from reachmap.cell.text.data import at, text_at
 from reachmap.maps.base.record import BasePlacement
 from reachmap.maps.bytes.to_json import json_ready
 from reachmap.maps.format.registry import Artefact, Result, kind_of
-from reachmap.maps.records import BinMap, WorkspaceMap
+from reachmap.maps.records import BinMap, BinPlacement, WorkspaceMap
 from reachmap.maps.robustness.record import Robustness
 from reachmap.maps.robustness.summary import (
     RobustnessSummary,
@@ -61,12 +62,22 @@ class ArtefactInfo:
     @property
     def cell_name(self) -> str:
         """Name of the cell, "" if the artefact does not have it."""
-        try:
-            cell = json.loads(self.record.provenance.cell_resolved_json)
-        except ValueError:
+        return text_at(self._cell, "name") or ""
+
+    @property
+    def bin_name(self) -> str:
+        """Which of several bins it is about, "" where there is one, or all are."""
+        about_one = isinstance(self.record, BinMap | BinPlacement)
+        if not about_one or not at(self._cell, "bins"):
             return ""
-        name = cell.get("name") if isinstance(cell, dict) else None
-        return name if isinstance(name, str) else ""
+        return text_at(self._cell, "bin", "name") or ""
+
+    @property
+    def _cell(self) -> Any:
+        try:
+            return json.loads(self.record.provenance.cell_resolved_json)
+        except ValueError:
+            return None
 
     def facts(self) -> dict[str, Any]:
         """Everything as JSON values; NaN is null."""
@@ -77,6 +88,7 @@ class ArtefactInfo:
             "finished": self.finished,
             **dataclasses.asdict(stamp),
             "cell": self.cell_name,
+            "bin": self.bin_name or None,
             "overrides": provenance.overrides,
             "source_sha256": provenance.source_sha256,
             "settings": provenance.settings,

@@ -61,7 +61,7 @@ def view_of(bin_map: BinMap) -> BinView:
     outer = bin_map.bin_inner[:2] + 2.0 * NOMINAL_WALL
     if context.cell is not None:
         outer = np.array(context.cell.bin.outer[:2])
-    return BinView(bin_map=bin_map, outer=outer, cell_name=context.name)
+    return BinView(bin_map=bin_map, outer=outer, cell_name=context.bin_name)
 
 
 def percent_after(bin_map: BinMap, attempts: int) -> FloatArray:

@@ -41,6 +41,13 @@ class CellContext:
     standing: tuple[Outline, ...] = ()
     bin: tuple[Outline, ...] = ()
 
+    @property
+    def bin_name(self) -> str:
+        """Name of the cell, and of the bin where it stands beside others."""
+        if self.cell is None or not self.cell.bins:
+            return self.name
+        return f"{self.name}, bin {self.cell.bin.name}"
+
 
 def context_of(provenance: Provenance) -> CellContext:
     """Read the resolved cell of an artefact.
