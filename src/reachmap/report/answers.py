@@ -19,8 +19,8 @@ from reachmap.maps.summary.statistics import (
 )
 from reachmap.report.blocks import Tile
 from reachmap.report.folder import RunFolder
-from reachmap.report.numbers import count, interval, number, percent, signed
 from reachmap.report.ranked_rows import cost_of_list, ranked_rows
+from reachmap.text import count, interval, number, percent, signed
 
 FIRST_PICKS = 3
 

@@ -6,10 +6,10 @@ import math
 import re
 
 from reachmap.maps.study.record import OBJECTIVES, Study
+from reachmap.text import MINUS, NONE
 
 UNIT_WORDS = {"percent": "%", "rad": "rad", "s": "s"}
 CHANGE_WORDS = {"percent": "points", "rad": "rad", "s": "s"}
-MINUS, NONE = "\N{MINUS SIGN}", "\N{EN DASH}"
 
 
 def estimate_text(objective: str, value: float, low: float, high: float) -> str:

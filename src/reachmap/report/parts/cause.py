@@ -21,7 +21,7 @@ from reachmap.report.blocks import (
     section,
     table,
 )
-from reachmap.report.numbers import percent
+from reachmap.text import percent
 
 PAIRS_SHOWN = 8
 

@@ -21,7 +21,7 @@ from reachmap.report.blocks import (
     section,
     table,
 )
-from reachmap.report.numbers import count, number, signed
+from reachmap.text import count, number, signed
 
 TITLE = "The cell"
 

@@ -8,7 +8,7 @@ from reachmap.plots.bin_map import draw_cycle
 from reachmap.plots.curves.timeline import draw_timeline
 from reachmap.plots.parts.levels import level_names
 from reachmap.report.blocks import Blocks, Heading, drawn, paragraph, table
-from reachmap.report.numbers import count, number, percent
+from reachmap.text import count, number, percent
 
 ENDS_SHOWN = 12
 

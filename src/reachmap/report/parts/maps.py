@@ -42,8 +42,8 @@ from reachmap.report.blocks import (
     section,
     table,
 )
-from reachmap.report.numbers import MINUS, count, interval, number, percent, signed
 from reachmap.report.parts.cycle import cycle_blocks
+from reachmap.text import MINUS, count, interval, number, percent, signed
 
 REASONS_SHOWN = 6
 

@@ -19,7 +19,7 @@ from reachmap.report.blocks import (
     section,
 )
 from reachmap.report.folder import RunFolder
-from reachmap.report.numbers import number
+from reachmap.text import number
 
 QUOTE = '"'
 

@@ -29,7 +29,6 @@ from reachmap.report.blocks import (
     section,
     table,
 )
-from reachmap.report.numbers import NONE, count, number
 from reachmap.report.ranked_rows import (
     RankedRow,
     cost_of_list,
@@ -37,6 +36,7 @@ from reachmap.report.ranked_rows import (
     ranked_rows,
     weights_of,
 )
+from reachmap.text import NONE, count, number
 
 TOP = 10
 

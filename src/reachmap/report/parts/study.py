@@ -25,7 +25,7 @@ from reachmap.report.blocks import (
     section,
     table,
 )
-from reachmap.report.numbers import NONE, count
+from reachmap.text import NONE, count
 
 # A page is read, a file is searched: what is beyond this stands in study.h5.
 ROWS, SENTENCES, CAUSES = 40, 12, 8

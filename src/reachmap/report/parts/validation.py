@@ -13,8 +13,8 @@ from reachmap.report.blocks import (
     section,
     table,
 )
-from reachmap.report.numbers import NONE, number, percent, signed
 from reachmap.report.ranked_rows import known_number
+from reachmap.text import NONE, number, percent, signed
 
 SHARES = {
     "precision": "precision (called reachable and reached)",
