@@ -287,13 +287,7 @@ def check_choice(choice: PlacementChoice) -> None:
     """Refuse wrong settings before the work is done."""
     if choice.rule not in RULES:
         raise SettingsError(f"rule {choice.rule!r}: expected {' or '.join(RULES)}")
-    if choice.top < 1:
-        raise SettingsError(f"top {choice.top}: expected at least 1")
-    unknown = sorted(set(choice.fixed) - set(AXES))
-    if unknown:
-        raise SettingsError(f"--fix {unknown[0]}: expected one of {', '.join(AXES)}")
-
-    check_places(choice.limits, choice.fixed)
+    check_places(choice.limits, choice.fixed, axes=AXES, top=choice.top)
 
 
 def _region(

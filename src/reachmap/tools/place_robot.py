@@ -153,13 +153,8 @@ def place_robot(
 
 def _check(choice: RobotChoice) -> None:
     """Refuse wrong settings before the work is done."""
-    if choice.top < 1:
-        raise SettingsError(f"top {choice.top}: expected at least 1")
-    unknown = sorted(set(choice.fixed) - set(AXES))
-    if unknown:
-        raise SettingsError(f"--fix {unknown[0]}: expected one of {', '.join(AXES)}")
     named = {choice.rail or name: pair for name, pair in choice.limits.items()}
-    check_places(named, choice.fixed)
+    check_places(named, choice.fixed, axes=AXES, top=choice.top)
     for name in choice.mountings:
         try:
             fits = name in LEANS_DEG or 0.0 <= float(name) <= 180.0

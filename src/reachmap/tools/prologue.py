@@ -84,15 +84,33 @@ def with_seed(overrides: Sequence[str], seed: int | None) -> tuple[str, ...]:
 
 
 def check_places(
-    limits: Mapping[str, tuple[float, float]], fixed: Mapping[str, float]
+    limits: Mapping[str, tuple[float, float]],
+    fixed: Mapping[str, float],
+    *,
+    axes: Sequence[str],
+    top: int,
 ) -> None:
-    """Refuse ranges that run backwards, and what is no number.
+    """Refuse where to look for a place if that is nowhere.
+
+    Parameters
+    ----------
+    limits, fixed : mapping
+        Range or value by name.
+    axes : sequence of str
+        What may be fixed.
+    top : int
+        Places that are mapped.
 
     Raises
     ------
     SettingsError
-        Also of a range that ends nowhere.
+        A range runs backwards or ends nowhere, an axis is unknown, or no place is left.
     """
+    if top < 1:
+        raise SettingsError(f"top {top}: expected at least 1")
+    unknown = sorted(set(fixed) - set(axes))
+    if unknown:
+        raise SettingsError(f"--fix {unknown[0]}: expected one of {', '.join(axes)}")
     for name, (low, high) in limits.items():
         if not -math.inf < low <= high < math.inf:
             raise SettingsError(

@@ -329,13 +329,13 @@ def _refine_block(
         going = (size > _TOLERANCE) & (waited[active] < _PATIENCE)
         if count == _ITERATIONS or not going.any():
             break
-        active, dq = active[going], _singular_step(J[going], error[going])
+        active, dq = active[going], _step_by_singular_values(J[going], error[going])
         longest = np.abs(dq).max(axis=1, initial=1e-300)
         q = q[going] + dq * np.minimum(1.0, _LARGEST_STEP / longest)[:, None]
     return best, residual
 
 
-def _singular_step(J: FloatArray, error: FloatArray) -> FloatArray:
+def _step_by_singular_values(J: FloatArray, error: FloatArray) -> FloatArray:
     """Solve (JᵀJ + μI) dq = Jᵀe by singular values.
 
     With μ proportional to the squared error the steps stay quadratically convergent
