@@ -87,7 +87,7 @@ def least_squares_many(
     for start in range(0, len(Q), _BLOCK):
         rows = slice(start, start + _BLOCK)
         goals = np.moveaxis(T_goal[rows, :3], 0, -1).astype(Q.dtype, order="C")
-        q, residual[rows] = _refine(
+        best[rows], residual[rows] = _refine(
             arm,
             np.ascontiguousarray(Q[rows].T),
             goals,
@@ -96,8 +96,39 @@ def least_squares_many(
             patience,
             bounds,
         )
-        best[rows] = q.T
     return best, residual
+
+
+class _Progress:
+    """Best configuration of each row so far, and which rows still move.
+
+    Parameters
+    ----------
+    Q : array, shape (n, dof)
+        Starts [rad].
+    tolerance : float
+        A row is done when it misses by no more than this [m and rad].
+    patience : int
+        A row that has not become ten times better in this many steps is given up.
+    """
+
+    def __init__(self, Q: FloatArray, tolerance: float, patience: int) -> None:
+        self._tolerance, self._patience = tolerance, patience
+        self.best, self.residual = Q.copy(), np.full(len(Q), np.inf, Q.dtype)
+        self._milestone, self._waited = self.residual.copy(), np.zeros(len(Q), int)
+        self.active = np.arange(len(Q))
+
+    def update(self, Q: FloatArray, size: FloatArray) -> BoolArray:
+        """Record the misses of the active rows; which of them go on."""
+        rows = self.active
+        better = size < self.residual[rows]
+        self.best[rows[better]], self.residual[rows[better]] = Q[better], size[better]
+        progress = self.residual[rows] < 0.1 * self._milestone[rows]
+        self._milestone[rows[progress]] = self.residual[rows[progress]]
+        self._waited[rows] = np.where(progress, 0, self._waited[rows] + 1)
+        going = (size > self._tolerance) & (self._waited[rows] < self._patience)
+        self.active = rows[going]
+        return going
 
 
 def _refine(
@@ -110,18 +141,11 @@ def _refine(
     bounds: tuple[FloatArray, FloatArray] | None,
 ) -> tuple[FloatArray, FloatArray]:
     """Refine a block: q (dof, n), goals (3, 4, n)."""
-    best, residual = q.copy(), np.full(q.shape[1], np.inf, q.dtype)
-    milestone, waited = residual.copy(), np.zeros(q.shape[1], int)
-    active = np.arange(q.shape[1])
+    progress = _Progress(q.T, tolerance, patience)
     for count in range(iterations + 1):
         error, J = arm.error_and_jacobian(q, goals)
         size = np.sqrt(np.maximum((error[:3] ** 2).sum(0), (error[3:] ** 2).sum(0)))
-        better = size < residual[active]
-        best[:, active[better]], residual[active[better]] = q[:, better], size[better]
-        progress = residual[active] < 0.1 * milestone[active]
-        milestone[active[progress]] = residual[active[progress]]
-        waited[active] = np.where(progress, 0, waited[active] + 1)
-        going = (size > tolerance) & (waited[active] < patience)
+        going = progress.update(q.T, size)
         if count == iterations or not going.any():
             break
         dq = _damped_step(J, error)
@@ -134,8 +158,8 @@ def _refine(
         if bounds is not None:
             q = np.clip(q, *bounds)
         if not going.all():
-            active, q, goals = active[going], q[:, going], goals[:, :, going]
-    return best, residual
+            q, goals = q[:, going], goals[:, :, going]
+    return progress.best, progress.residual
 
 
 def _damped_step(J: FloatArray, error: FloatArray) -> FloatArray:
@@ -312,27 +336,19 @@ def refine_many(
 
 
 def _refine_block(
-    chain: SerialChain, Q: FloatArray, T_goal: FloatArray
+    chain: SerialChain, q: FloatArray, T_goal: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    best, residual = Q.copy(), np.full(len(Q), np.inf)
-    milestone, waited = np.full(len(Q), np.inf), np.zeros(len(Q), int)
-    active, q = np.arange(len(Q)), Q
+    progress = _Progress(q, _TOLERANCE, _PATIENCE)
     for count in range(_ITERATIONS + 1):
         T, J = chain.jacobian_many(q)
-        error = pose_error(T_goal[active], T)
-        size = _size(error)
-        better = size < residual[active]
-        best[active[better]], residual[active[better]] = q[better], size[better]
-        progress = residual[active] < 0.1 * milestone[active]
-        milestone[active[progress]] = residual[active[progress]]
-        waited[active] = np.where(progress, 0, waited[active] + 1)
-        going = (size > _TOLERANCE) & (waited[active] < _PATIENCE)
+        error = pose_error(T_goal[progress.active], T)
+        going = progress.update(q, _size(error))
         if count == _ITERATIONS or not going.any():
             break
-        active, dq = active[going], _step_by_singular_values(J[going], error[going])
+        dq = _step_by_singular_values(J[going], error[going])
         longest = np.abs(dq).max(axis=1, initial=1e-300)
         q = q[going] + dq * np.minimum(1.0, _LARGEST_STEP / longest)[:, None]
-    return best, residual
+    return progress.best, progress.residual
 
 
 def _step_by_singular_values(J: FloatArray, error: FloatArray) -> FloatArray:
