@@ -23,6 +23,7 @@ from reachmap.geometry import (
 # Poses are rounded far below what matters, so that a cell that was moved and turned
 # gives the same numbers seen from its bin.
 DIGITS_M, DIGITS_TURN = 9, 12
+# Rounding of an axis that is meant to be vertical (1 less its z component).
 UPRIGHT = 1e-6
 WORLD = "world"
 

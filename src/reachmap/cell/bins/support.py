@@ -21,6 +21,7 @@ from reachmap.geometry import (
 # Points of a shape this far below its highest one still belong to its top face; a
 # bin that is this near to a top face stands on it.
 FLAT_M, TOUCH_M = 5e-4, 5e-3
+# Rounding of an edge that is meant to coincide; a lean that is meant to be none.
 SLACK_M = 1e-6
 STEADY_DEG = 0.1
 # Parts slide out of a bin long before; it is a bin that was meant to stand.

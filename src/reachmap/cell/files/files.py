@@ -31,6 +31,7 @@ from reachmap.cell.text.yaml_reader import (
 from reachmap.disk import is_folder
 from reachmap.errors import CellError
 
+# A choice against hostile input: the largest mesh of example-robot-data has 29 MB.
 MAX_MESH_BYTES = 100_000_000
 
 

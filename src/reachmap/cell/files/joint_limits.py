@@ -31,6 +31,7 @@ _KEYS = tuple(
 )
 # Say nothing that a map depends on.
 _NEEDLESS = ("has_effort_limits", "max_effort", "angle_wraparound")
+# Larger than any limit of a joint; a number beyond it is refused as a mistake.
 _LARGEST = 1e6
 _TAGS = {"!degrees": math.radians, "!radians": float}
 # As yaml-cpp and rospy read them; YAML 1.2 knows only true and false.

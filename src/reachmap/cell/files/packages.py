@@ -17,6 +17,7 @@ from reachmap.disk import is_file, is_folder
 LEVELS = 6  # folders above a file that are looked at: robots/maker/arm/urdf/…
 WORKSPACE_LEVELS = 3  # folders above a package: repository, src, workspace
 DEPTH = 3  # folders below those
+# A choice: a home folder beside the robot must not be searched to its end.
 MAX_FOLDERS = 3_000
 _NAME = re.compile(rb"<name>\s*([^<\s]+)\s*</name>")
 

@@ -25,6 +25,7 @@ from reachmap.cell.files.robot_text import parse_xml
 from reachmap.errors import CellError
 from reachmap.geometry import inverse_transform
 
+# A choice against hostile input: the largest robot of example-robot-data has 130 links.
 MAX_LINKS = 2_000
 MOVING = ("revolute", "continuous", "prismatic")
 # Of several degrees of freedom: held at zero beside the arm, refused in it.

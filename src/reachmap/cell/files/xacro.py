@@ -20,6 +20,7 @@ from reachmap.errors import CellError, MissingExtraError
 
 # Descriptions with hundreds of links take one or two seconds.
 LIMIT_CPU_S = 20
+# A choice, generous for a busy machine; and address space, most of it only reserved.
 LIMIT_WALL_S = 300.0
 LIMIT_BYTES = 4_000_000_000
 PLACES = (

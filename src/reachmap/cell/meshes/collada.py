@@ -19,6 +19,7 @@ from reachmap.geometry import rotation_from_quaternion_wxyz, transform_points
 Element = ElementTree.Element
 # A few nodes that name each other can ask for any number of copies.
 MAX_INSTANCES = 10_000
+# A choice against hostile input, which bounds the memory as MAX_MESH_BYTES does not.
 MAX_TRIANGLES = 5_000_000
 
 

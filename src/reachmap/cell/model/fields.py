@@ -24,6 +24,7 @@ from reachmap.geometry import (
     transform_from_parts,
 )
 
+# Larger than any cell, and ten turns: numbers beyond are in other units.
 MAX_LENGTH_M = 100.0
 MAX_ANGLE_DEG = 3600.0
 

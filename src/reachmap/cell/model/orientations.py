@@ -9,6 +9,7 @@ from pydantic import Discriminator, Field, Tag, model_validator
 
 from reachmap.cell.model.fields import Angle, Angles3, Record
 
+# A choice: a ring every 3 degrees from straight down to level.
 MAX_RINGS = 32
 Tilt = Annotated[float, Field(ge=0, le=180, allow_inf_nan=False)]
 Rolls = Annotated[int, Field(ge=1, le=360)]

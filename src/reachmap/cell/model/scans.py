@@ -38,6 +38,7 @@ class CubeSpec(Record):
         return self
 
 
+# Ten million frames with five repeats, the example of docs/how-to/scale-out.md.
 MAX_FRAMES = 50_000_000
 
 

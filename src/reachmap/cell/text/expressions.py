@@ -19,6 +19,7 @@ from reachmap.cell.text.messages import did_you_mean
 from reachmap.cell.text.yaml_reader import Document, Location
 
 SIGN = "="
+# A choice: two lines of text; what is longer is not a formula.
 MAX_LENGTH = 200
 # Texts for people may begin with any sign.
 TEXTS: Final = frozenset({"name", "description", "unit"})

@@ -18,6 +18,7 @@ from reachmap.cell.text.yaml_reader import (
 from reachmap.disk import is_text, recorded_name
 from reachmap.errors import CellError
 
+# A choice against hostile input, far above what a command line holds.
 MAX_OVERRIDES = 1000
 SOURCE = "--set "
 

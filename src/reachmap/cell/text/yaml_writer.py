@@ -9,6 +9,7 @@ from typing import Any
 
 from reachmap.cell.model.cell import Cell
 
+# A choice: cells read like the code around them.
 WIDTH = 88
 _PLAIN = re.compile(r"(package://)?[A-Za-z][A-Za-z0-9_/.-]*")
 _WORDS = frozenset({"true", "false", "null", "yes", "no", "on", "off", "y", "n"})
