@@ -31,6 +31,7 @@ ROUNDING_M = 1e-6
 MOST_QUESTIONS = 2_000_000
 # Configurations at a time, for the sake of memory.
 BLOCK = 4096
+# A choice: changed answers show early, and small blocks cost little.
 FIRST_BLOCK = 64
 EVERY = -1
 """Of a moving body: all of them."""

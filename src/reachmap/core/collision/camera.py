@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from reachmap.core.robot.model import RobotModel
     from reachmap.core.scene import Scene
 
+# A choice: a body that reaches into this sphere is the camera's housing or a cover.
 LENS_RADIUS_M = 0.001
 
 

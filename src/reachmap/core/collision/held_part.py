@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
 # Corners of the rings of a swept body, which are around the true circles: 0.5 % more.
 _RING_STEPS = 32
+# Rounding of an axis that is meant to be the TCP's [m, and 1 less a cosine].
 _COAXIAL_M = 1e-9
 
 

@@ -60,6 +60,7 @@ def _turned(axis: tuple[float, float, float]) -> FloatArray:
     return transform_from_parts(R * np.sign(np.diag(R)), np.zeros(3))
 
 
+# A choice: a direction along no axis of the TCP, so that no joint is met by chance.
 _ASIDE = _turned((0.48, 0.60, 0.64))
 
 # At a wrist singularity the direction decides which points of the curve are found.
