@@ -29,6 +29,7 @@ PACKAGES = (
 )  # fmt: skip
 """Distributions whose versions are recorded."""
 
+# A choice against hostile input: no settings are nested nearly as deep.
 MAX_DEPTH = 32
 _JSON: Final[Mapping[str, type]] = {
     "overrides": list,

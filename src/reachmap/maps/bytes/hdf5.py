@@ -19,6 +19,7 @@ from reachmap.maps.bytes.tree import Array, Leaf, Tree
 
 # What a reader has to hold at once.
 CHUNK_BYTES = 16 * 2**20
+# A choice against hostile input: workspace maps have fewer than a hundred.
 MAX_OBJECTS = 10_000
 MAX_BYTES = 16 * 2**30
 """Largest artefact that is read into memory [bytes, uncompressed]."""

@@ -41,6 +41,7 @@ CPU_LIMIT_S = 2.0
 SECONDS_PER_BYTE = 0.5e-6
 """More time for larger images; unpacking takes a twentieth of it."""
 
+# A cache line [bytes]; no element of an array needs more.
 ALIGNMENT = 64
 MAX_COPIED_BYTES = 512 * 2**20
 """Images larger than this are not worth a second copy of what is in them."""

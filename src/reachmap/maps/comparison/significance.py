@@ -13,6 +13,7 @@ from reachmap._typing import BoolArray, FloatArray, IntArray
 Z_95 = 1.959963984540054
 """Quantile of the standard normal distribution that leaves 2.5 % above it."""
 
+# The customary level, which the 95 % intervals have as well.
 FALSE_DISCOVERY_RATE = 0.05
 
 

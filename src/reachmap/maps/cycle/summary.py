@@ -21,6 +21,7 @@ from reachmap.maps.parts import ABOVE_RIM_M, StageStatus
 from reachmap.maps.records import BinMap, Status
 
 SHOWN = {TO_GRASP: "way to the grasp"}
+# Lifts that rise all the way differ by rounding alone.
 _ROUNDING_M = 1e-6
 
 

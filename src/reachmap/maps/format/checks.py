@@ -17,6 +17,7 @@ from reachmap.maps.format.assembly import expand
 from reachmap.maps.format.layout import COMMON_ATTRIBUTES, Layout, Variable
 from reachmap.maps.records import NO_PAIR, Status
 
+# Single precision with some room; what we write is good to 1e-15.
 _ROTATION_TOLERANCE = 1e-6
 LENGTH_TOLERANCE_RAD = 1e-6
 """By which lengths may differ from those of the stored waypoints, and their share."""
