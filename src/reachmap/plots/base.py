@@ -43,6 +43,7 @@ from reachmap.plots.parts.style import (
     put_title,
 )
 
+# Lengths on paper [in], and the room around the bin [m]: choices of layout.
 LEFT, RIGHT, TOP, BOTTOM = 0.80, 1.05, 1.05, 2.0
 WIDEST, TALLEST, ROOM_M = 5.6, 5.6, 0.15
 LINE = 0.19

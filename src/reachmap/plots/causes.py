@@ -23,6 +23,7 @@ from reachmap.plots.parts.style import (
     subtitle_of,
 )
 
+# Choices of layout: bars, letters of a name, lengths on paper [in].
 PAIRS_SHOWN = 10
 LETTERS = 40
 LEFT, RIGHT, WIDTH, ROW = 2.9, 0.9, 4.6, 0.27

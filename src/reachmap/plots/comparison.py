@@ -44,8 +44,10 @@ from reachmap.plots.parts.style import (
     put_title,
 )
 
+# Lengths on paper [in]: choices of layout.
 LEFT, RIGHT, TOP, BOTTOM = 0.80, 0.95, 1.05, 0.98
 WIDEST, TALLEST = 4.4, 5.6
+# A choice: few scales, so that several comparisons can be laid side by side.
 CHANGE_LIMITS = (10.0, 25.0, 50.0, 100.0)
 
 

@@ -46,6 +46,7 @@ from reachmap.plots.parts.style import (
     put_title,
 )
 
+# Choices of layout: lengths on paper [in], and lines of text.
 LEFT, RIGHT, TOP, GAP = 0.80, 0.95, 1.05, 0.75
 BOTTOM = 2.0
 WIDEST, TALLEST = 5.6, 6.2

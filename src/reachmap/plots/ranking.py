@@ -49,6 +49,7 @@ TERM_COLOURS: Final[Mapping[str, str]] = {
 }
 OTHER_COLOURS: Final = ("#9467bd", "#8c6d4f", "#5fb0c9", "#a8a13b")
 """Of stages that go by other names."""
+# Choices of layout: bars, in units of the distance of two groups.
 MAX_GROUPS: Final = 24
 BAR_WIDTH: Final = 0.38
 PLACES: Final = (-0.21, 0.21)

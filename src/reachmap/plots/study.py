@@ -36,6 +36,7 @@ from reachmap.plots.parts.style import (
     put_title,
 )
 
+# Lengths on paper [in]: choices of layout.
 PANEL, GAP, LEFT, BOTTOM, HEIGHT, HEAD = 2.6, 0.35, 0.85, 0.68, 2.6, 1.0
 SQUARE = 0.75
 # More labels than this would run into each other.

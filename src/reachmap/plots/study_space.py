@@ -38,6 +38,7 @@ from reachmap.plots.parts.style import (
     put_title,
 )
 
+# Choices of layout: lengths on paper [in], letters, labels on an axis.
 LEFT, BOTTOM, HEAD, HEIGHT = 0.85, 0.75, 1.05, 3.0
 AXIS_IN = 1.5
 SQUARE, GAP = 0.42, 0.75

@@ -31,6 +31,7 @@ from reachmap.validation.summary import GroupSummary, OrderFigures, Validation
 
 LIST_COLOURS: Final = ("#2f6db3", "#3d9970", "#9467bd", "#b8860b", "#4f4f4f")
 MISS_COLOUR: Final = "#c0392b"
+# Choices of layout: letters, and bars in units of the distance of two groups.
 MAX_GROUPS: Final = 24
 LABEL_WIDTH: Final = 18
 BAR_WIDTH: Final = 0.26

@@ -9,6 +9,7 @@ from reachmap.core.collision.solids import Solid
 
 Rgb: TypeAlias = tuple[int, int, int]
 
+# Choices by eye, red for what is in the way alone.
 LINK: Rgb = (150, 164, 184)
 BIN: Rgb = (38, 92, 190)
 BLOCKING: Rgb = (214, 31, 38)

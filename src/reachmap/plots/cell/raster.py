@@ -16,12 +16,15 @@ from scipy.sparse import csr_array
 from reachmap._typing import BoolArray, FloatArray, IntArray
 from reachmap.geometry import transform_points
 
+# A choice: samples of a pixel along each side, against jagged edges.
 SAMPLES = 2
 # Sides of the tiles in which small facets are drawn many at a time [pixels].
 TILES = (6, 16, 40)
+# A choice that bounds the memory.
 CHUNK_PIXELS = 400_000
 # Faces that meet at a smaller angle are shaded as one round surface.
 CREASE_COS = float(np.cos(np.radians(38.0)))
+# Choices by eye: where edges are drawn, how dark they are, and where light comes from.
 DEPTH_JUMP_M = 0.012
 BEND_COS = 0.72
 INK = 0.16

@@ -23,6 +23,7 @@ from reachmap.plots.parts.style import (
 )
 from reachmap.plots.ranking import part_colours, term_label
 
+# A choice of layout.
 ROW_IN: Final = 0.36
 WAIT_LABEL: Final = "waits (image, grip, release)"
 

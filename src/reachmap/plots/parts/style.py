@@ -36,6 +36,7 @@ BIN_COLOUR = "#10389c"
 
 TITLE_SIZE, SUBTITLE_SIZE, LABEL_SIZE, TICK_SIZE = 12.5, 9.5, 9.5, 8.5
 SMALLEST_NUMBER, LARGEST_NUMBER = 4.8, 10.0
+# A choice: sharp on paper, in files of a moderate size.
 DPI = 200
 
 STYLE: dict[Any, Any] = {
