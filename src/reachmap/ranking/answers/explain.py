@@ -15,6 +15,7 @@ from reachmap.ranking.lookup.matching import Queries
 from reachmap.ranking.lookup.ranker import Ranker
 from reachmap.text import printable
 
+# A choice: what fits on a screen.
 LISTED_TIES = 12
 
 

@@ -23,6 +23,7 @@ from reachmap.ranking.lists.fields import (
 from reachmap.ranking.lists.json_text import JsonPath
 
 FORMAT: Final = "reachmap.grasps"
+# A choice against hostile input: the longest list we met had 12,000 grasps.
 MAX_GRASPS: Final = 100_000
 LENGTH_UNITS: Final[Mapping[str, float]] = {"m": 1.0, "mm": 1e-3}
 QUADRANTS: Final = ("NE", "NW", "SE", "SW", None)

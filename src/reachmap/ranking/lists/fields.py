@@ -12,7 +12,9 @@ import numpy as np
 
 from reachmap.ranking.lists.json_text import JsonPath
 
+# The largest length of a cell as well; numbers beyond it are in other units.
 MAX_COORDINATE_M: Final = 100.0
+# A shorter vector is a zero with rounding, and points nowhere.
 MIN_DIRECTION: Final = 1e-6
 ORIENTATIONS: Final = (
     "direction",

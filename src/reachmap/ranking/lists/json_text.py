@@ -13,6 +13,7 @@ from reachmap.errors import GraspListError
 
 JsonPath: TypeAlias = tuple[str | int, ...]
 
+# A choice: what fits on a screen.
 MAX_LINES = 20
 _TOKEN = re.compile(r'"(?:[^"\\]|\\.)*+"|[{}\[\],:]|[^\s{}\[\],:"]+')
 _CONSTANTS = frozenset({"NaN", "Infinity", "-Infinity"})

@@ -34,6 +34,7 @@ from reachmap.ranking.lists.json_text import (
 from reachmap.ranking.lookup.settings import Invalid
 
 STDIN: Final = "-"
+# A choice against hostile input: room for MAX_GRASPS at 330 bytes each.
 MAX_BYTES: Final = 32 * 2**20
 
 NATIVE: Final = "reachmap"

@@ -37,6 +37,7 @@ MEDIAN_STEPS: Final = 0.3
 # Grasps that are compared with all their neighbours at once: some 100 MB.
 ROWS_AT_ONCE: Final = 2000
 
+# In place of a state, from the top of a byte downwards: states count from 0.
 OUTSIDE_MAP: Final = 254
 UNLIKE_MAP: Final = 253
 INVALID: Final = 252

@@ -22,11 +22,14 @@ INVALIDS: Final[tuple[Invalid, ...]] = ("mark", "raise")
 ALIKE_STEPS: Final = 1.5
 Roll: TypeAlias = Literal["as-given", "free", "fixed"]
 ROLLS: Final[tuple[Roll, ...]] = ("as-given", "free", "fixed")
+# A choice: beyond it the other terms are lost; EVEN is what the paper takes.
 MAX_WEIGHT: Final = 1e6
 EVEN: Final = (1.0, 1.0, 1.0)
+# A choice that bounds the memory of a look-up.
 MAX_NEIGHBOURS: Final = 64
 Cost: TypeAlias = Literal["paper", "cycle"]
 COSTS: Final[tuple[Cost, ...]] = ("paper", "cycle")
+# A choice: more than a day of penalty is a mistake.
 MAX_FAILURE_S: Final = 1e5
 MARGINS: Final = ("clearance", "joint_margin", "singularity", "wind_up")
 """Optional terms of J: what a path leaves, and how far it winds the wrist up."""

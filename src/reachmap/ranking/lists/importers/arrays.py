@@ -17,9 +17,12 @@ from reachmap.ranking.lists.document import MAX_GRASPS
 
 # Networks answer in half precision, three digits.
 UNIT_TOLERANCE: Final = 1e-2
+# A choice: the limit of lists, for what an archive unpacks to.
 MAX_NPZ_BYTES: Final = 32 * 2**20
+# Rows as graspnetAPI stores them; the functions below name the columns.
 GRASPNET_COLUMNS: Final = 17
 SUCTION_COLUMNS: Final = 7
+# A choice: no number of a grasp is as large, in any unit.
 MAX_VALUE: Final = 1e9
 
 
