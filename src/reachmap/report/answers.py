@@ -22,6 +22,7 @@ from reachmap.report.folder import RunFolder
 from reachmap.report.ranked_rows import cost_of_list, ranked_rows
 from reachmap.text import count, interval, number, percent, signed
 
+# A choice: as many as one line holds.
 FIRST_PICKS = 3
 
 

@@ -11,13 +11,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeAlias
 
 from reachmap.maps.format.registry import Artefact, Result
-from reachmap.plots.parts.style import figure_bytes
+from reachmap.plots.parts.style import DPI, figure_bytes
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawing
 
-PNG_DPI = 200.0
-# Pictures are shown a little larger than on paper.
+# A choice: pictures are shown a little larger than on paper.
 ENLARGED = 1.12
 
 
@@ -68,7 +67,7 @@ class Picture:
     @property
     def width_px(self) -> int:
         """Width on the page [CSS px]."""
-        return round(int.from_bytes(self.png[16:20], "big") * 96.0 / PNG_DPI * ENLARGED)
+        return round(int.from_bytes(self.png[16:20], "big") * 96.0 / DPI * ENLARGED)
 
 
 @dataclass(frozen=True, slots=True)

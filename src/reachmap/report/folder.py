@@ -21,6 +21,7 @@ from reachmap.maps.study.format import read_study
 from reachmap.maps.study.record import Study
 from reachmap.ranking.lists.json_text import parse_json
 
+# A choice against hostile input, far above what rank and validate write.
 MAX_JSON_BYTES = 64 * 2**20
 
 # Role -> kind, usual name, and the command that makes it.

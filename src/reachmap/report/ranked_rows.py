@@ -12,6 +12,7 @@ from reachmap.ranking.answers.ranked_list import TERM_NAMES
 
 SECONDS: Final = re.compile(r"[a-z][a-z_]{0,40}_s")
 """Names of terms in predicted seconds: stages are what a map calls them."""
+# A choice against hostile input, beyond the terms of any cost.
 MOST_TERMS: Final = 16
 
 

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     import viser
 
 HOST = "127.0.0.1"
+# A choice by eye, so that what is in the shade stays readable.
 AMBIENT = 1.3
 
 

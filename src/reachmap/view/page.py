@@ -226,6 +226,7 @@ def _placement_page(
     return str(recording.as_html())
 
 
+# A choice: colours of the gradient that stands for the scale, one at every quarter.
 STEPS = 5
 # The page may run its own scripts and nothing else: no address is ever contacted.
 POLICY = (

@@ -19,6 +19,7 @@ from reachmap.maps.records import BinMap
 from reachmap.motions.motion import trapezoid, way_points
 from reachmap.view.points import shortest_paths
 
+# A choice: the rate of cinema, at which motions look smooth.
 FRAMES_PER_S = 24.0
 HELD_STAGES = 3
 """Stages with the part in hand: lift, transfer, place."""

@@ -23,6 +23,7 @@ from reachmap.report.blocks import (
 )
 from reachmap.text import percent
 
+# A choice: as many as a reader takes in.
 PAIRS_SHOWN = 8
 
 

@@ -10,6 +10,7 @@ from reachmap.plots.parts.levels import level_names
 from reachmap.report.blocks import Blocks, Heading, drawn, paragraph, table
 from reachmap.text import count, number, percent
 
+# A choice: as many as a reader takes in.
 ENDS_SHOWN = 12
 
 

@@ -45,6 +45,7 @@ from reachmap.report.blocks import (
 from reachmap.report.parts.cycle import cycle_blocks
 from reachmap.text import MINUS, count, interval, number, percent, signed
 
+# A choice: as many as a reader takes in.
 REASONS_SHOWN = 6
 
 

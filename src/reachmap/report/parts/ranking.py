@@ -38,6 +38,7 @@ from reachmap.report.ranked_rows import (
 )
 from reachmap.text import NONE, count, number
 
+# A choice: a line hardly ever tries more.
 TOP = 10
 
 
