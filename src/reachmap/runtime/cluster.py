@@ -19,6 +19,8 @@ from reachmap.runtime.pool import Slot
 # Enough on the way that no thread waits for the network, few enough that a lost worker
 # loses little.
 UNITS_PER_THREAD = 4
+# Choices: how often the size of the cluster is asked for, and how long a batch system
+# may take to start its workers.
 WINDOW_AGE_S = 5.0
 WAIT_FOR_WORKERS_S = 300.0
 

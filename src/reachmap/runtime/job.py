@@ -35,6 +35,7 @@ KINDS: dict[str, str] = {
 ENGINES = ("numpy", "scipy", "pin", "coal", "ompl", "eaik")
 # Stages of one run that a worker may be sent back to.
 KEPT_JOBS = 3
+# A choice: the last calls, which say where; in characters.
 MAX_TRACEBACK = 4000
 
 

@@ -38,9 +38,12 @@ UNITS = "units"
 """Phase of the units that become the artefact."""
 PUBLISHED = "published"
 """Phase of notes on what a run has put in place of its output."""
+# Choices against damaged files: twice the frames of the largest scan, one to a unit;
+# and far more bytes than a unit writes.
 MAX_UNITS = 100_000_000
 MAX_LINE = 256 * 1024 * 1024
 PREFIX = 9  # eight digits and a space
+# A choice: values in messages are cut, in characters.
 SHOWN = 60
 _START = re.compile(rb'[0-9a-f]{8} \{"format":"reachmap\.journal"')
 _RECORD = re.compile(

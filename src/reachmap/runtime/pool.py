@@ -32,11 +32,13 @@ from reachmap.runtime.job import Job, Reply, Ticket, compute, get_ready, ticket_
 
 # One death may be chance (memory, an impatient scheduler), three are the unit's.
 STRIKES = 3
+# A choice: a unit gets one more chance for each suspect that proved innocent, at most.
 MORE_STRIKES = 9
 FAILED_STARTS = 3
 """Workers that die one after another before any got ready: they cannot start here."""
 FAILED_RESTARTS = 20
 """The same where workers have been ready before, and something kills them now."""
+# A choice: how soon an interrupt is heeded.
 TICK_S = 0.1
 
 log = logging.getLogger(__name__)

@@ -14,6 +14,7 @@ from reachmap.text import is_terminal
 if TYPE_CHECKING:
     import rich.progress
 
+# Choices: logs stay short, bars look alive, and rates are those of the last minute.
 LINE_INTERVAL_S: Final = 30.0
 BAR_INTERVAL_S: Final = 0.1
 RATE_WINDOW_S: Final = 60.0

@@ -12,6 +12,7 @@ from reachmap.runtime.encoding import Json
 from reachmap.runtime.job import Kind, kind_named
 from reachmap.runtime.journal import Entries, read_store
 
+# A choice: one message, not a page.
 SHOWN_FAILURES = 5
 SHOWN_UNITS = 6
 

@@ -27,6 +27,7 @@ from reachmap.runtime.journal import (
     seal,
 )
 
+# A choice: one message, not a page.
 SHOWN_DIFFERENCES = 8
 NO_LOCKS = frozenset({errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOSYS})
 
