@@ -26,6 +26,7 @@ from reachmap.sampling.frames import FrameGrid, FrameList
 if TYPE_CHECKING:
     from reachmap.cell.loading import LoadedCell
 
+# What a byte of the map holds; more solutions are counted as this many.
 MAX_COUNT = 255
 TURNS_TRIED = 4
 """Turns of one solution that a plan is given at once."""

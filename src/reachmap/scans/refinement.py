@@ -51,9 +51,13 @@ CANDIDATES: Final = 8
 """Drawn for each that is chosen."""
 IN_DOUBT: Final = 0.45
 """Estimates nearer to one half are not sure; where none is, no more are drawn."""
+# A choice: a bare flange, which turns about its own wrist.
 SHORTEST_LEVER_M: Final = 0.1
+# A choice: fewer than of a survey, as each is solved in many rolls.
 GRASPS_PER_UNIT: Final = 20
+# Degrees of freedom of a pose in space.
 FULL_DOF: Final = 6
+# Any number, so that the draws are those of no other part of a scan.
 SEED_OF_REFINEMENT: Final = 0x5EF1
 
 

@@ -19,6 +19,7 @@ from reachmap.cell.text.messages import did_you_mean
 from reachmap.cell.text.yaml_reader import parse_yaml
 from reachmap.errors import SettingsError
 
+# A choice: at a minute a variant, a week of one core.
 MAX_VARIANTS = 10_000
 # Digits of a value of an even range: 0.1 + 0.2 is to read 0.3.
 DIGITS = 12

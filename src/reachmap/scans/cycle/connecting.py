@@ -16,6 +16,7 @@ from reachmap.scans.ik_survey import Survey
 from reachmap.scans.routes import Routes
 from reachmap.scans.workspace_roadmap import connect_survey
 
+# Rounding of a configuration that was stored and read again.
 _SAME_RAD = 1e-9
 
 

@@ -24,6 +24,7 @@ from reachmap.scans.measured import attempt_seed
 # Configurations of a drop-off that are kept, those most lifts are nearest to, and how
 # many lifts are asked: what is left is within a percent of the best of all.
 _KEPT, _ASKED = 8, 400
+# Tells the draws of this stage from those of others.
 _SEED = 1 << 21
 WaysToPlace = tuple[list[tuple[FloatArray, FloatArray]], str]
 

@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 
 # Branches of the kinematics that are compared to the end; the rest is bounded away.
 _COMPARED = 3
+# Tells the draws of this stage from those of others.
 _SEED = 1 << 20
 NO_ROW = -1
 

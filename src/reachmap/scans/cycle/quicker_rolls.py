@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from reachmap.cell.loading import LoadedCell
     from reachmap.scans.ik_survey import Survey
 
+# A choice: large enough for batches, small enough that workers end together.
 GROUPS_PER_UNIT = 100
 # A roll is worth a look where it promises a twentieth of the motion. Two goals of each
 # grasp are kept, should one have no way in; after so many tries no more is looked for.
