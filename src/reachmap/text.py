@@ -6,6 +6,7 @@ import math
 import os
 from typing import TextIO
 
+# A choice: names of grasps in tables, in characters.
 ID_WIDTH = 16
 MINUS = "\N{MINUS SIGN}"
 NONE = "\N{EN DASH}"

@@ -46,6 +46,7 @@ from reachmap.tools.prologue import (
 if TYPE_CHECKING:
     from reachmap.cell.loading import LoadedCell
 
+# A choice: an estimate within seconds; planning to a grasp varies.
 SAMPLE_GRASPS = 20
 
 logger = logging.getLogger(__name__)

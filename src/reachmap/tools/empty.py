@@ -36,7 +36,9 @@ from reachmap.ranking.lookup.ranker import Ranker
 logger = logging.getLogger(__name__)
 
 FILL, HEAPS, MAX_HEAPS = 0.9, 3, 1000
+# A choice that bounds the memory of a heap.
 MAX_PARTS = 20_000
+# More likely reached than not.
 LIKELY = 0.5
 ORDERS = ("highest", "rank")
 

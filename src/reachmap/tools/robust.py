@@ -30,6 +30,8 @@ from reachmap.robustness.problem import RobustnessProblem, certificates, replaye
 from reachmap.runtime.options import IN_PROCESS, RunOptions
 from reachmap.tools.prologue import refuse_cell_files
 
+# Choices: errors in parts of the stated ones, cells drawn for each, and errors beyond
+# which a cell is another cell.
 SCALES = np.array([0.0, 0.25, 0.5, 1.0, 1.5, 2.0])
 DEFAULT_SAMPLES, MAX_SAMPLES = 24, 10_000
 MAX_SHIFT_M, MAX_TURN_RAD = 0.5, np.radians(45.0)

@@ -23,6 +23,7 @@ from reachmap.tools.prologue import path_of_cell, refuse_cell_files
 from reachmap.view.engine import HOST, require_viewer, start_server, stop_server
 from reachmap.view.guard import Guard
 
+# The default of viser as well.
 PORT = 8080
 
 

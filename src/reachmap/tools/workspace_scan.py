@@ -36,6 +36,7 @@ from reachmap.tools.prologue import (
 logger = logging.getLogger(__name__)
 
 METHODS = ("roadmap", "per-frame")
+# A choice: an estimate within seconds; inverse kinematics is quick.
 SAMPLE_FRAMES = 200
 
 

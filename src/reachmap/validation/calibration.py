@@ -19,6 +19,7 @@ from reachmap.errors import SettingsError
 from reachmap.ranking.lookup.probability import Calibration
 from reachmap.validation.statistics import Share, share_of
 
+# Customary: ten bins for a reliability diagram, five folds for a cross-validation.
 BINS: Final = 10
 FOLDS: Final = 5
 # Fewer leave the rate of the least bin good to hardly 0.1.

@@ -12,6 +12,7 @@ from reachmap.ranking.lists.reading import grasps_from_document
 from reachmap.ranking.lookup.table import GraspTable, table_from_bin_map
 from reachmap.sampling.volume import GraspVolume
 
+# The limit of grasp lists as well.
 MAX_RANDOM = 100_000
 
 
