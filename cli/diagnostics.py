@@ -33,6 +33,7 @@ from reachmap.cli.streams import AnswerError, discard_stdout
 from reachmap.errors import MissingExtraError, OutputError, ReachmapError
 from reachmap.text import is_terminal
 
+# EX_SOFTWARE of sysexits.h; 128 and the signal (SIGINT, SIGPIPE), as shells count.
 INTERNAL_ERROR = 70
 INTERRUPTED = 130
 PIPE_CLOSED = 141

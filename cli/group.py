@@ -268,7 +268,7 @@ class PipelineGroup(click.Group):
     context_settings={
         "auto_envvar_prefix": "REACHMAP",
         "help_option_names": ["-h", "--help"],
-        "max_content_width": 88,
+        "max_content_width": 88,  # as tables.WIDTH, which the group does not load
     },
 )
 @click.option(

@@ -12,6 +12,7 @@ from reachmap.maps.summary.base import (
 )
 from reachmap.text import plural
 
+# A choice: the answer fits on a screen.
 REASONS_SHOWN = 5
 
 

@@ -11,6 +11,7 @@ from reachmap.maps.comparison.comparison import Cause, Comparison, SquareChange
 from reachmap.text import plural
 from reachmap.tools.compare import MapComparison, MapComparisons
 
+# Choices: the answer fits on a screen.
 SQUARES_SHOWN = 10
 CAUSES_SHOWN = 8
 CHANGES_SHOWN = 12

@@ -9,6 +9,7 @@ from reachmap.maps.cycle.seconds import Throughput
 from reachmap.maps.cycle.summary import CycleSummary
 from reachmap.text import percent_text, plural
 
+# A choice: the answer fits on a screen.
 ENDS_SHOWN = 8
 
 

@@ -8,6 +8,7 @@ from reachmap.maps.summary.evidence import EvidenceSummary
 from reachmap.maps.summary.statistics import STATUS_NAMES, Causes
 from reachmap.text import count_text, plural
 
+# A choice: the answer fits on a screen.
 PAIRS_SHOWN = 5
 
 

@@ -17,7 +17,7 @@ from reachmap.cli.text.evidence import (
 )
 from reachmap.cli.text.robustness import robustness_lines
 from reachmap.cli.text.study import study_lines
-from reachmap.cli.text.tables import fact_lines, table_lines
+from reachmap.cli.text.tables import WIDTH, fact_lines, table_lines
 from reachmap.maps.bytes.to_json import flat_json
 from reachmap.maps.format.candidates import is_turn
 from reachmap.maps.robustness.summary import RobustnessSummary
@@ -32,8 +32,6 @@ from reachmap.maps.summary.workspace import LevelSummary, WorkspaceSummary
 from reachmap.plots.parts.levels import level_names
 from reachmap.text import percent_text, plural
 from reachmap.tools.info import ArtefactInfo
-
-LINE = 88
 
 
 def info_text(info: ArtefactInfo) -> str:
@@ -72,7 +70,7 @@ def _approximation_lines(info: ArtefactInfo) -> list[str]:
     if not text:
         return []
     said = f'inverse kinematics is approximate ({text}), so that "no IK solution" '
-    return textwrap.wrap(f"{said}means that none was found this way", LINE)
+    return textwrap.wrap(f"{said}means that none was found this way", WIDTH)
 
 
 def _workspace_lines(summary: WorkspaceSummary) -> list[str]:

@@ -15,6 +15,7 @@ from reachmap.ranking.lookup.table import TERMS
 from reachmap.ranking.terms import FAILURE, PLANNING
 from reachmap.text import printable
 
+# A choice: the answer fits on a screen.
 TABLE_ROWS = 10
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import textwrap
 
-from reachmap.cli.text.tables import table_lines
+from reachmap.cli.text.tables import WIDTH, table_lines
 from reachmap.maps.study.words import estimate_text
 from reachmap.maps.summary.study import (
     MainEffect,
@@ -13,10 +13,10 @@ from reachmap.maps.summary.study import (
 )
 from reachmap.text import plural
 
+# Choices: the answer fits on a screen or two.
 VARIANTS_SHOWN = 40
 SENTENCES_SHOWN = 12
 LEVELS_SHOWN = 12
-LINE = 88
 
 
 def study_lines(summary: StudySummary) -> list[str]:
@@ -50,7 +50,7 @@ def _best_lines(summary: StudySummary) -> list[str]:
     return [
         line
         for text in lines
-        for line in textwrap.wrap(text, LINE, subsequent_indent="  ")
+        for line in textwrap.wrap(text, WIDTH, subsequent_indent="  ")
     ]
 
 
@@ -64,7 +64,7 @@ def _sentence_lines(summary: StudySummary) -> list[str]:
         line
         for text in found[:SENTENCES_SHOWN]
         for line in textwrap.wrap(
-            text, LINE, initial_indent="  ", subsequent_indent="    "
+            text, WIDTH, initial_indent="  ", subsequent_indent="    "
         )
     ]
     more = [f"  and {rest} more (--json has all)"] if rest > 0 else []
@@ -136,7 +136,7 @@ def _causes_of(title: str, rows: list[VariantSummary]) -> list[str]:
         for variant in rows[:SENTENCES_SHOWN]
         for line in textwrap.wrap(
             f"{variant.assignment}: {variant.cause}",
-            LINE,
+            WIDTH,
             initial_indent="  ",
             subsequent_indent="    ",
         )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Sequence
 
+# A choice: the width of our code, so that answers fit into documents as well.
 WIDTH = 88
 
 

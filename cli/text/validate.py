@@ -16,6 +16,7 @@ from reachmap.validation.summary import (
     Validation,
 )
 
+# A choice: names of files and conditions, in characters.
 LABEL_WIDTH = 32
 SHORT_ORDERS = {"supplied": "supplied", "re-ranked": "re-ranked", "ik-only": "IK only"}
 
