@@ -263,15 +263,14 @@ def find_warnings(document: Document, cell: Cell, files: CellFiles) -> tuple[str
 
 def _bin_warnings(document: Document, cell: Cell, files: CellFiles) -> list[str]:
     warnings = []
-    for place, spec in cell.every_bin():
-        which = "the bin" if place == ("bin",) else f"bin {place[-1]!r}"
+    places = bin_places(document.data)
+    for (name, place), (_, spec) in zip(places, cell.every_bin(), strict=True):
+        which = "the bin" if name == "bin" else f"bin {place[-1]!r}"
         if (side := max(spec.inner)) > LARGE_M:
             warnings.append(_large(document, (*place, "inner"), which, side))
         if spec.mesh is None:
             continue
-        key = body_key(
-            "bin" if place == ("bin",) else f"bin {place[-1]}", spec.mesh.file
-        )
+        key = body_key(name, spec.mesh.file)
         label, scale, where = f"mesh of {which}", spec.mesh.factors, (*place, "mesh")
         warnings += _mesh_warnings(document, files, key, label, scale, where)
     return warnings
