@@ -73,16 +73,14 @@ def test_check_as_json_has_the_numbers() -> None:
 
 def test_check_names_the_bodies_that_touch_and_the_joint_outside() -> None:
     """The report is printed all the same; the exit code is 2."""
-    result = run(
-        "check", "planar-toy",
-        "--set", "scan_configuration.q_deg={joint_1: 5, joint_2: 190, joint_3: 0}",
-    )  # fmt: skip
+    change = "scan_configuration.q_deg={joint_1: 5, joint_2: 190, joint_3: 0}"
+    result = run("check", "planar-toy", "--set", change)
     assert result.exit_code == 2
     assert "scan configuration  INVALID" in result.stdout
     assert result.stderr.splitlines() == [
-        "reachmap: planar-toy: scan_configuration: joint_2 = 190 deg is outside its "
-        "limits [-180, 180]",
-        "reachmap: planar-toy: scan_configuration: link_1 touches post",
+        f"reachmap: --set {change}: scan_configuration: joint_2 = 190 deg is outside "
+        "its limits [-180, 180]",
+        f"reachmap: --set {change}: scan_configuration: link_1 touches post",
     ]
 
 

@@ -235,3 +235,38 @@ def test_other_bins_can_be_taken_away(two):
     assert alone.sha256 != loaded.sha256
     assert loaded.with_other_bins(loaded.cell.bins) is loaded
     assert np.allclose(alone.cell.T_base_bin(), loaded.cell.T_base_bin())
+
+
+@pytest.mark.parametrize(
+    ("overrides", "place"),
+    [
+        ([], "{file}:{line}:"),
+        (["bins.left.wall=0.005"], "{file}:{line}:"),
+        ([f"bins={{left: {LEFT}, right: {RIGHT}}}"], "--set bins={{left: {{inner:"),
+        ([f"bins.left={LEFT}"], "--set bins.left={{inner:"),
+        (
+            ["bins.left.pose={xyz: [0, 0, 0]}"],
+            "--set bins.left.pose={{xyz: [0, 0, 0]}}",
+        ),
+        (
+            ["bins.left.pose.xyz.0=0.1", "bins.left.pose.xyz.1=0.2"],
+            "--set bins.left.pose.xyz.0=0.1 --set bins.left.pose.xyz.1=0.2",
+        ),
+        (["bins.left.pose.xyz.0=0.1", f"bins.left={LEFT}"], "--set bins.left={{inner:"),
+    ],
+)
+def test_what_was_given_last_is_the_place_of_a_key(two, overrides, place):
+    """A line of the file only where no assignment is to the key, above or below it."""
+    lines = Path(two).read_text().splitlines()
+    line = 1 + next(k for k, text in enumerate(lines) if text.startswith("  left:"))
+    found = read_cell(two, overrides).place_of("bins.left.pose")
+    assert found.startswith(place.format(file=two, line=line))
+
+
+def test_a_pose_that_nobody_gave_has_the_place_of_its_bin(two):
+    """The line of the bin, or the assignment that gave the bin without a pose."""
+    bare = "bins.left={inner: [0.3, 0.2, 0.05], wall: 0.006}"
+    loaded = read_cell(two, [bare])
+    assert loaded.place_of("bins.left.pose") == f"--set {bare}"
+    assert loaded.place_of("bins.right.rim").startswith(f"{two}:")
+    assert loaded.place_of("lift") == two

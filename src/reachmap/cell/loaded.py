@@ -16,11 +16,12 @@ from xml.sax.saxutils import quoteattr, unescape
 from reachmap._typing import FloatArray
 from reachmap.cell.files.files import body_key
 from reachmap.cell.files.joint_limits import MoveItLimits
-from reachmap.cell.files.resources import NotFoundError, Resolver
+from reachmap.cell.files.resources import NotFoundError, Resolver, shipped_folder
 from reachmap.cell.files.urdf import UrdfDescription, parse_urdf
 from reachmap.cell.model.bodies import BinSpec
 from reachmap.cell.model.cell import Cell, JointValues, ScanConfiguration
-from reachmap.cell.text.yaml_reader import parse_yaml, spelled
+from reachmap.cell.text.overrides import apply_overrides, is_override
+from reachmap.cell.text.yaml_reader import is_within, parse_yaml, spelled
 from reachmap.errors import CellError
 
 SUFFIXES = (".yaml", ".yml")
@@ -106,21 +107,29 @@ class LoadedCell:
         }
 
     def place_of(self, key: str) -> str:
-        """Where the cell file gives a key: file, line and column.
+        """Where a key was given: by which overrides, or file, line and column.
 
-        The source alone where the file does not give it, or an override does.
+        What encloses the key counts where it was not given itself; the source alone
+        where there is nothing, or no file of the user's.
         """
-        if Path(self.source).suffix not in SUFFIXES or any(
-            change.startswith(key) for change in self.overrides
-        ):
+        has_lines = Path(self.source).suffix in SUFFIXES
+        if not has_lines and not (shipped_folder() / f"{self.source}.yaml").is_file():
             return self.source
         document = parse_yaml(self.text, self.source)
-        places = (
+        apply_overrides(document, self.overrides, Cell)
+        names = {at: spelled(at, document.data) for at in document.places}
+        around = [at for at, name in names.items() if name and is_within(key, name)]
+        if not around:
+            return self.source
+        location = max(around, key=len)
+        given = [
             str(place)
-            for location, place in document.places.items()
-            if spelled(location, document.data) == key
-        )
-        return next(places, self.source)
+            for at, place in document.places.items()
+            if is_override(place) and (at == location or is_within(names[at], key))
+        ]
+        if given:
+            return " ".join(dict.fromkeys(given))
+        return str(document.places[location]) if has_lines else self.source
 
     def resolve(self, reference: str) -> Path:
         """Absolute path of a file named in the cell file; CellError if none."""

@@ -98,6 +98,15 @@ def spelled(location: Location, data: Any) -> str:
     return path.removeprefix(".")
 
 
+def is_within(path: str, outer: str) -> bool:
+    """Whether a path as people read it is another one, or leads further.
+
+    >>> is_within("bin.pose.xyz", "bin.pose"), is_within("bin.poses", "bin.pose")
+    (True, False)
+    """
+    return path == outer or path.startswith((f"{outer}.", f"{outer}["))
+
+
 @dataclass(slots=True, kw_only=True)
 class Document:
     """Data of one YAML text with the place of every value and key.
