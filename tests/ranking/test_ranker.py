@@ -187,7 +187,7 @@ def test_likeness_grows_with_both_distances():
     """φ6 is 0 on a test grasp, ½ one pitch away, ½ one orientation step away."""
     m = all_reachable()
     ranker = Ranker(m)
-    pitch = ranker.table.pitch.max()
+    pitch = ranker.table.pitch_m.max()
     assert pitch == pytest.approx(0.12)
     assert ranker.table.spacing_rad[0] == pytest.approx(np.radians(30.0))
     x_axis = m.bin_pose[:3, 0]
@@ -306,7 +306,7 @@ def test_more_neighbours_than_points():
 
 def test_outside_the_map_sideways_above_and_below():
     """Beyond half a grid diagonal and 1 mm, 5 cm off the layer, or the floor."""
-    half = 0.5 * np.hypot(*RANKER.table.pitch)
+    half = 0.5 * np.hypot(*RANKER.table.pitch_m)
     x_edge = BIN_MAP.x[-1]
     points = {
         (0.0, 0.0, 0.028): False,

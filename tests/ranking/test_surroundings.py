@@ -39,9 +39,9 @@ def by_loops(p_bin, direction):
     for place in np.ndindex(*table.shape[:3]):
         weight = 1.0
         steps = (
-            np.ptp(table.layers) / (table.shape[0] - 1),
-            table.pitch[1],
-            table.pitch[0],
+            np.ptp(table.layers_m) / (table.shape[0] - 1),
+            table.pitch_m[1],
+            table.pitch_m[0],
         )
         for axis, step in zip((2, 1, 0), steps, strict=True):
             weight *= max(0.0, 1.0 - abs(p_bin[axis] - lattice[place][axis]) / step)
@@ -107,7 +107,7 @@ def test_beyond_the_map_it_fades_to_the_share_of_the_map():
     table = Ranker(bin_map).table
     ranker = Ranker(dataclasses.replace(bin_map, path_found=found, effort=None))
     pitches = np.linspace(0.0, 0.65, 6)
-    p_bin = table.bin_points[-1] + pitches[:, None] * [*table.pitch, 0.0]
+    p_bin = table.bin_points[-1] + pitches[:, None] * [*table.pitch_m, 0.0]
     T = bin_map.bin_pose
     points = p_bin @ T[:3, :3].T + T[:3, 3]
     down = np.tile(-T[:3, 2], (6, 1))

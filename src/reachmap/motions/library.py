@@ -237,7 +237,7 @@ class MotionLibrary:
             angle = quaternion_angle(table.quaternions[points], query.quaternions[0])
         spacing = float(table.spacing_rad[0 if free else 1])
         usable = (self._rows[points] >= 0) & (angle <= ALIKE_STEPS * spacing)
-        pitch = float(table.pitch.max())
+        pitch = float(table.pitch_m.max())
         far = (away[points, None] / pitch) ** 2 + (angle / spacing) ** 2
         # Rolls of one direction are as far: the one of the shortest path comes first.
         length = table.means[points, :, 0]

@@ -27,7 +27,7 @@ class GraspVolume:
 
     @classmethod
     def of(
-        cls, points: FloatArray, layers: FloatArray, pitch: float, axes: FloatArray
+        cls, points: FloatArray, layers_m: FloatArray, pitch_m: float, axes: FloatArray
     ) -> GraspVolume:
         """Volume of a grid of test grasps.
 
@@ -38,17 +38,17 @@ class GraspVolume:
         ----------
         points : array, shape (n, 3)
             In the bin frame [m].
-        layers : array, shape (nl,)
+        layers_m : array, shape (nl,)
             Heights [m].
-        pitch : float
+        pitch_m : float
             Larger spacing of the grid [m].
         axes : array, shape (n, 3)
             Approach directions in the bin frame.
         """
         low, high = points.min(axis=0), points.max(axis=0)
-        step = float(np.diff(layers).max()) if len(layers) > 1 else pitch
-        low[2] = max(float(layers[0]) - step / 2, 0.0)
-        high[2] = float(layers[-1]) + step / 2
+        step = float(np.diff(layers_m).max()) if len(layers_m) > 1 else pitch_m
+        low[2] = max(float(layers_m[0]) - step / 2, 0.0)
+        high[2] = float(layers_m[-1]) + step / 2
         down = -axes[:, 2]
         return cls(low=low, high=high, cosines=(float(down.min()), float(down.max())))
 

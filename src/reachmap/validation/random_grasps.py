@@ -57,7 +57,7 @@ def mapped_volume(table: GraspTable) -> GraspVolume:
     """The volume covered by the test grasps of a map."""
     return GraspVolume.of(
         table.bin_points,
-        table.layers,
-        float(table.pitch.max()),
-        table.axes.reshape(-1, 3) @ table.bin_pose[:3, :3],
+        table.layers_m,
+        float(table.pitch_m.max()),
+        table.axes.reshape(-1, 3) @ table.T_base_bin[:3, :3],
     )

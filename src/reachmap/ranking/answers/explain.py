@@ -113,7 +113,7 @@ def _match_line(ranked: RankedList, row: int, ranker: Ranker) -> str:
     ranking, table = ranked.ranking, ranker.table
     layer, y, x, orientation = ranking.test_grasp[row].tolist()
     spacing = table.spacing_rad[0 if ranking.roll_free[row] else 1]
-    pitch = " × ".join(f"{1e3 * side:.1f}" for side in table.pitch)
+    pitch = " × ".join(f"{1e3 * side:.1f}" for side in table.pitch_m)
     return (
         f"layer {layer}, y {y}, x {x}, orientation {orientation}; "
         f"φ1 = {1e3 * ranking.distance[row]:.1f} mm (grid {pitch} mm), "

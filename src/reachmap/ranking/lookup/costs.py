@@ -240,11 +240,11 @@ def outside_map(points: FloatArray, nearest: IntArray, table: GraspTable) -> Boo
     """
     p = transform_points(table.T_bin_base, points)
     sideways = np.hypot(*(p - table.bin_points[nearest])[:, :2].T)
-    reach = 0.5 * float(np.hypot(*table.pitch)) + SIDEWAYS_TOLERANCE_M
-    step = float(np.diff(table.layers).max(initial=0.0))
+    reach = 0.5 * float(np.hypot(*table.pitch_m)) + SIDEWAYS_TOLERANCE_M
+    step = float(np.diff(table.layers_m).max(initial=0.0))
     margin = max(0.5 * step, VERTICAL_TOLERANCE_M)
-    low = max(float(table.layers[0]) - margin, -BOTTOM_TOLERANCE_M)
-    high = float(table.layers[-1]) + margin
+    low = max(float(table.layers_m[0]) - margin, -BOTTOM_TOLERANCE_M)
+    high = float(table.layers_m[-1]) + margin
     return np.asarray((sideways > reach) | (p[:, 2] < low) | (p[:, 2] > high))
 
 
@@ -257,9 +257,9 @@ def unlike_map(
     neighbouring orientations (of approach axes where the roll is free).
     """
     if max_angle_deg is not None:
-        return np.asarray(matches.angle > np.radians(max_angle_deg))
+        return np.asarray(matches.angle_rad > np.radians(max_angle_deg))
     spacing = np.where(free, table.spacing_rad[0], table.spacing_rad[1])
-    return np.asarray(matches.angle > ALIKE_STEPS * spacing)
+    return np.asarray(matches.angle_rad > ALIKE_STEPS * spacing)
 
 
 def beyond_points(points: FloatArray, table: GraspTable) -> BoolArray:
@@ -277,9 +277,9 @@ def likeness_terms(matches: Matches, free: BoolArray, table: GraspTable) -> Floa
     greatest angle between neighbouring orientations of the map (of approach axes where
     the roll is free). 0 on a test grasp, about 1 a whole step away in both.
     """
-    h = float(table.pitch.max())
+    h = float(table.pitch_m.max())
     spacing = np.where(free, table.spacing_rad[0], table.spacing_rad[1])
-    return np.asarray(0.5 * (matches.distance / h + matches.angle / spacing))
+    return np.asarray(0.5 * (matches.distance_m / h + matches.angle_rad / spacing))
 
 
 def median_terms(

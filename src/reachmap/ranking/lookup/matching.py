@@ -145,16 +145,16 @@ class Matches:
     Attributes
     ----------
     point, orientation : int array, shape (n,)
-    distance : array, shape (n,)
+    distance_m : array, shape (n,)
         φ1 [m].
-    angle : array, shape (n,)
+    angle_rad : array, shape (n,)
         φ2 [rad]; between approach axes where the roll is free.
     """
 
     point: IntArray
     orientation: IntArray
-    distance: FloatArray
-    angle: FloatArray
+    distance_m: FloatArray
+    angle_rad: FloatArray
 
 
 def match(
@@ -217,8 +217,8 @@ def match_at(
     return Matches(
         point=point.copy(),
         orientation=orientation,
-        distance=distance.copy(),
-        angle=_angles(queries, table, point, orientation),
+        distance_m=distance.copy(),
+        angle_rad=_angles(queries, table, point, orientation),
     )
 
 
@@ -294,8 +294,8 @@ def _rematch(
     every = np.arange(len(rows))
     matches.point[rows] = point[every, column]
     matches.orientation[rows] = orientation
-    matches.distance[rows] = distance[every, column]
-    matches.angle[rows] = _angles(part, table, point[every, column], orientation)
+    matches.distance_m[rows] = distance[every, column]
+    matches.angle_rad[rows] = _angles(part, table, point[every, column], orientation)
 
 
 def _tied_points(

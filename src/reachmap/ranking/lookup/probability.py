@@ -54,7 +54,7 @@ class Surroundings:
     def __init__(self, table: GraspTable) -> None:
         self._table = table
         lattice = table.bin_points.reshape(*table.shape[:3], 3)
-        self._coordinates = (table.layers, lattice[0, :, 0, 1], lattice[0, 0, :, 0])
+        self._coordinates = (table.layers_m, lattice[0, :, 0, 1], lattice[0, 0, :, 0])
         reached = table.reachable.astype(float)
         axes, any_roll = table.axes, reached
         if table.same_everywhere:
@@ -117,7 +117,11 @@ class Surroundings:
         """
         table = self._table
         p = transform_points(table.T_bin_base, points)
-        pitches = (float(table.pitch.max()), float(table.pitch[1]), table.pitch[0])
+        pitches = (
+            float(table.pitch_m.max()),
+            float(table.pitch_m[1]),
+            table.pitch_m[0],
+        )
         low, share, far = [], [], np.zeros(len(p))
         for axis, at, pitch in zip((2, 1, 0), self._coordinates, pitches, strict=True):
             value = p[:, axis]

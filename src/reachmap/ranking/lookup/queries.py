@@ -277,7 +277,7 @@ def queries_from_arrays(
     free = as_given if roll == "as-given" else np.full(n, roll == "free")
     if roll == "fixed" and not known.all():
         R = R.copy()
-        R_bin = table.bin_pose[:3, :3]
+        R_bin = table.T_base_bin[:3, :3]
         R[~known] = complete_rotation(axes[~known], R_bin, table.approach_axis)
     return Queries(
         points=p, axes=axes, quaternions=_quaternions(R, free), free=free, valid=valid

@@ -75,16 +75,16 @@ class GraspTable:
         With the planning time that was used, whatever was asked for.
     same_everywhere : bool
         Whether every point has the same orientations, as families give them.
-    layers : array, shape (nl,)
+    layers_m : array, shape (nl,)
         Heights in the bin frame [m].
     bin_points : array, shape (n, 3)
         The points in the bin frame [m].
-    pitch : array, shape (2,)
+    pitch_m : array, shape (2,)
         Spacing of the grid along the bin's x and y [m].
     spacing_rad : array, shape (2,)
         Greatest angle from an orientation to its nearest other: of approach axes,
         of whole orientations.
-    T_bin_base, bin_pose : array, shape (4, 4)
+    T_bin_base, T_base_bin : array, shape (4, 4)
     approach_axis : str
     """
 
@@ -104,12 +104,12 @@ class GraspTable:
     cycle: CycleSeconds | None
     basis: CostBasis
     same_everywhere: bool
-    layers: FloatArray
+    layers_m: FloatArray
     bin_points: FloatArray
-    pitch: FloatArray
+    pitch_m: FloatArray
     spacing_rad: FloatArray
     T_bin_base: FloatArray
-    bin_pose: FloatArray
+    T_base_bin: FloatArray
     approach_axis: str
 
     def __post_init__(self) -> None:
@@ -179,14 +179,14 @@ def table_from_bin_map(bin_map: BinMap, basis: CostBasis | None = None) -> Grasp
         same_everywhere=bool(
             (quaternion_angle(quaternions, quaternions[0]) < 1e-9).all()
         ),
-        layers=bin_map.layer.copy(),
+        layers_m=bin_map.layer.copy(),
         bin_points=transform_points(T_bin_base, points),
-        pitch=_pitch(bin_map),
+        pitch_m=_pitch(bin_map),
         spacing_rad=np.array(
             [_spacing(axes, direction_angle), _spacing(quaternions, quaternion_angle)]
         ),
         T_bin_base=T_bin_base,
-        bin_pose=bin_map.bin_pose.copy(),
+        T_base_bin=bin_map.bin_pose.copy(),
         approach_axis=bin_map.approach_axis,
     )
 

@@ -115,7 +115,7 @@ class RefinedVerdicts:
             the nearest refining grasp that is not reached; else 0.
         """
         # A test grasp itself is known.
-        own = (matches.distance < TIE_M) & (matches.angle < TIE_RAD)
+        own = (matches.distance_m < TIE_M) & (matches.angle_rad < TIE_RAD)
         decided = queries.free & queries.valid & ~own
         reached = share >= REACHED_FROM
         reachable = self._table.reachable[matches.point, matches.orientation]
@@ -138,11 +138,13 @@ class RefinedVerdicts:
             matches,
             point=point,
             orientation=orientation,
-            distance=np.where(rows, np.linalg.norm(offset, axis=1), matches.distance),
-            angle=np.where(
+            distance_m=np.where(
+                rows, np.linalg.norm(offset, axis=1), matches.distance_m
+            ),
+            angle_rad=np.where(
                 rows,
                 direction_angle(queries.axes, table.axes[point, orientation]),
-                matches.angle,
+                matches.angle_rad,
             ),
         )
 
