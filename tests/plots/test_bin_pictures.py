@@ -169,7 +169,9 @@ def test_sunburst_tiles_the_disc_once() -> None:
     directions = approach_directions(orientation_set(CONE), "+z")
     sectors = sunburst_sectors(directions)
     assert len(sectors) == 27
-    areas = [(s.outer**2 - s.inner**2) * (s.end - s.start) / 2.0 for s in sectors]
+    areas = [
+        (s.outer**2 - s.inner**2) * (s.end_rad - s.start_rad) / 2.0 for s in sectors
+    ]
     assert sum(areas) == pytest.approx(np.pi)
     assert sum(sector.inner == 0.0 for sector in sectors) == 3
     assert sum(sector.border for sector in sectors) == 8
@@ -184,7 +186,7 @@ def test_sector_lies_on_the_side_the_tool_leans_to() -> None:
          np.full(8, -np.cos(tilt))], axis=-1
     )  # fmt: skip
     for direction, sector in zip(directions, sunburst_sectors(directions), strict=True):
-        middle = (sector.start + sector.end) / 2.0
+        middle = (sector.start_rad + sector.end_rad) / 2.0
         lean = -direction[:2] / np.linalg.norm(direction[:2])
         np.testing.assert_allclose([np.cos(middle), np.sin(middle)], lean, atol=1e-9)
 
@@ -196,7 +198,7 @@ def test_sunburst_of_arbitrary_directions_is_well_formed() -> None:
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     for sector in sunburst_sectors(directions):
         assert 0.0 <= sector.inner < sector.outer <= 1.0 + 1e-12
-        assert sector.end > sector.start
+        assert sector.end_rad > sector.start_rad
         assert np.isfinite(sector.polygon()).all()
 
 

@@ -50,7 +50,7 @@ def test_outlines_have_the_size_of_the_shape(
     body = {"name": "thing", "attach_to": "robot_base", "shape": shape}
     (outline,) = body_outlines(with_bodies(body))
     assert area(outline.polygon) == pytest.approx(expected[0], rel=4e-3)
-    assert outline.z_high - outline.z_low == pytest.approx(expected[1], rel=1e-9)
+    assert outline.z_high_m - outline.z_low_m == pytest.approx(expected[1], rel=1e-9)
 
 
 def test_bodies_in_the_world_move_with_the_base_pose() -> None:
@@ -66,7 +66,7 @@ def test_bodies_in_the_world_move_with_the_base_pose() -> None:
     # Seen from a base turned by +90°, world +x is its -y.
     np.testing.assert_allclose(outline.polygon.mean(axis=0), [0.0, -1.0], atol=1e-9)
     np.testing.assert_allclose(np.ptp(outline.polygon, axis=0), [0.1, 0.2], atol=1e-9)
-    assert (outline.z_low, outline.z_high) == pytest.approx((0.0, 0.4))
+    assert (outline.z_low_m, outline.z_high_m) == pytest.approx((0.0, 0.4))
 
 
 def test_what_the_arm_carries_and_meshes_are_left_out() -> None:
@@ -94,7 +94,7 @@ def test_bin_outlines_are_inner_and_outer_rectangle() -> None:
     np.testing.assert_allclose(np.ptp(inner.polygon, axis=0), [0.26, 0.36])
     np.testing.assert_allclose(np.ptp(outer.polygon, axis=0), [0.27, 0.37])
     np.testing.assert_allclose(inner.polygon.mean(axis=0), [0.5, 0.1])
-    assert (outer.z_low, outer.z_high) == pytest.approx((-0.06, 0.10))
+    assert (outer.z_low_m, outer.z_high_m) == pytest.approx((-0.06, 0.10))
     assert (outer.name, inner.name) == ("bin", "")
 
 
@@ -133,7 +133,7 @@ def test_base_outline_joins_the_links_that_stand_still() -> None:
     """Fixed joints are followed, moving ones are not."""
     outline = base_outline(CELL, URDF)
     np.testing.assert_allclose(np.ptp(outline.polygon, axis=0), [0.6, 0.4], atol=0.01)
-    assert (outline.z_low, outline.z_high) == pytest.approx((-0.02, 0.1))
+    assert (outline.z_low_m, outline.z_high_m) == pytest.approx((-0.02, 0.1))
 
 
 @pytest.mark.parametrize(

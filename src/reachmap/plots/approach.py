@@ -58,22 +58,22 @@ class Sector:
     ----------
     inner, outer : float
         Radii, as parts of the radius of the whole.
-    start, end : float
+    start_rad, end_rad : float
         Angles from the bin's x axis [rad].
     border : bool
-        Whether another direction begins at ``start``.
+        Whether another direction begins at ``start_rad``.
     """
 
     inner: float
     outer: float
-    start: float
-    end: float
+    start_rad: float
+    end_rad: float
     border: bool = False
 
     def polygon(self) -> FloatArray:
         """Corners for a sunburst of radius 1 at the origin, shape (n, 2)."""
-        steps = max(2, int(np.ceil((self.end - self.start) / 0.2)) + 1)
-        angle = np.linspace(self.start, self.end, steps)
+        steps = max(2, int(np.ceil((self.end_rad - self.start_rad) / 0.2)) + 1)
+        angle = np.linspace(self.start_rad, self.end_rad, steps)
         arc = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
         if self.inner == 0.0:
             return np.concatenate([self.outer * arc, np.zeros((1, 2))])
@@ -81,7 +81,7 @@ class Sector:
 
     def border_line(self) -> FloatArray:
         """Return the ends of the line where the direction begins, shape (2, 2)."""
-        ray = np.array([np.cos(self.start), np.sin(self.start)])
+        ray = np.array([np.cos(self.start_rad), np.sin(self.start_rad)])
         return np.stack([self.inner * ray, self.outer * ray])
 
 
@@ -120,8 +120,8 @@ def sunburst_sectors(directions: FloatArray) -> tuple[Sector, ...]:
             Sector(
                 inner=float(edges[ring[g]]),
                 outer=float(edges[ring[g] + 1]),
-                start=float(starts[g] + place * share),
-                end=float(starts[g] + (place + 1) * share),
+                start_rad=float(starts[g] + place * share),
+                end_rad=float(starts[g] + (place + 1) * share),
                 border=place == 0 and bool(np.sum(ring == ring[g]) > 1),
             )
         )

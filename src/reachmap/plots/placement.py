@@ -210,8 +210,8 @@ def _draw_bins(
                 name="camera view",
                 kind="camera",
                 polygon=camera_view,
-                z_low=z,
-                z_high=z,
+                z_low_m=z,
+                z_high_m=z,
             )
         )
     outlines += [

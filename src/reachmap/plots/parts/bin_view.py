@@ -27,27 +27,27 @@ class BinView:
     Attributes
     ----------
     bin_map : BinMap
-    outer : array, shape (2,)
+    outer_m : array, shape (2,)
         Outer x and y of the bin, rim included [m].
     cell_name : str
     """
 
     bin_map: BinMap
-    outer: FloatArray
+    outer_m: FloatArray
     cell_name: str
 
     @property
-    def margin(self) -> float:
+    def margin_m(self) -> float:
         """Room between the inner bottom and the edge of the picture [m]."""
         inner = self.bin_map.bin_inner[:2]
-        return float((self.outer - inner).max()) / 2.0 + 0.09 * float(inner.min())
+        return float((self.outer_m - inner).max()) / 2.0 + 0.09 * float(inner.min())
 
     def view(self) -> FloatArray:
         """Lower and upper corner of the picture in the bin frame [m], shape (2, 2)."""
         half = np.asarray(self.bin_map.bin_inner[:2]) / 2.0
         x, y = cell_edges(self.bin_map.x), cell_edges(self.bin_map.y)
-        low = np.minimum(-half, [x[0], y[0]]) - self.margin
-        high = np.maximum(half, [x[-1], y[-1]]) + self.margin
+        low = np.minimum(-half, [x[0], y[0]]) - self.margin_m
+        high = np.maximum(half, [x[-1], y[-1]]) + self.margin_m
         return np.stack([low, high])
 
     def layer_text(self, layer: int) -> str:
@@ -61,7 +61,7 @@ def view_of(bin_map: BinMap) -> BinView:
     outer = bin_map.bin_inner[:2] + 2.0 * NOMINAL_WALL
     if context.cell is not None:
         outer = np.array(context.cell.bin.outer[:2])
-    return BinView(bin_map=bin_map, outer=outer, cell_name=context.bin_name)
+    return BinView(bin_map=bin_map, outer_m=outer, cell_name=context.bin_name)
 
 
 def percent_after(bin_map: BinMap, attempts: int) -> FloatArray:
@@ -75,7 +75,7 @@ def percent_after(bin_map: BinMap, attempts: int) -> FloatArray:
 def frame_bin(axes: Axes, view: BinView) -> None:
     """Draw the walls to scale and an arrow towards the robot; set the limits."""
     inner = np.asarray(view.bin_map.bin_inner[:2])
-    for sides, width in ((inner, 0.9), (view.outer, 1.8)):
+    for sides, width in ((inner, 0.9), (view.outer_m, 1.8)):
         axes.add_patch(
             Rectangle(
                 (-sides[0] / 2.0, -sides[1] / 2.0),
@@ -97,7 +97,7 @@ def frame_bin(axes: Axes, view: BinView) -> None:
 def _point_to_robot(axes: Axes, view: BinView) -> None:
     robot = inverse_transform(view.bin_map.bin_pose)[:2, 3]
     distance = float(np.linalg.norm(robot))
-    half = view.outer / 2.0
+    half = view.outer_m / 2.0
     if (np.abs(robot) < half).all():
         return
     towards = robot / distance
@@ -105,7 +105,9 @@ def _point_to_robot(axes: Axes, view: BinView) -> None:
     with np.errstate(divide="ignore"):
         exits = half / np.abs(towards)
     exit_at = float(exits.min())
-    room = view.margin - float((view.outer - view.bin_map.bin_inner[:2]).max()) / 2.0
+    room = (
+        view.margin_m - float((view.outer_m - view.bin_map.bin_inner[:2]).max()) / 2.0
+    )
     start, end = (towards * (exit_at + part * room) for part in (0.12, 0.92))
     axes.add_patch(
         FancyArrowPatch(

@@ -70,19 +70,19 @@ class Outline:
         How it is drawn, a key of :data:`LOOKS`.
     polygon : array, shape (n, 2)
         Corners in the level frame [m], not closed.
-    z_low, z_high : float
+    z_low_m, z_high_m : float
         Heights that the thing spans [m].
     """
 
     name: str
     kind: Kind
     polygon: FloatArray
-    z_low: float
-    z_high: float
+    z_low_m: float
+    z_high_m: float
 
-    def near(self, z: float, distance: float) -> bool:
-        """Whether it crosses the height ``z`` or comes within ``distance`` [m]."""
-        return self.z_low - distance <= z <= self.z_high + distance
+    def near(self, z_m: float, distance_m: float) -> bool:
+        """Whether it crosses the height or comes near to it [m]."""
+        return self.z_low_m - distance_m <= z_m <= self.z_high_m + distance_m
 
 
 def hull_outline(name: str, kind: Kind, points: FloatArray) -> Outline:
@@ -93,7 +93,7 @@ def hull_outline(name: str, kind: Kind, points: FloatArray) -> Outline:
     except QhullError:  # flat or too few points: the points are their own outline
         xy = np.unique(xy, axis=0)
     low, high = float(points[:, 2].min()), float(points[:, 2].max())
-    return Outline(name=name, kind=kind, polygon=xy, z_low=low, z_high=high)
+    return Outline(name=name, kind=kind, polygon=xy, z_low_m=low, z_high_m=high)
 
 
 def body_outlines(cell: Cell) -> tuple[Outline, ...]:
@@ -248,7 +248,7 @@ def _star_outline(points: FloatArray, centre: FloatArray) -> Outline:
     ]
     low, high = float(points[:, 2].min()), float(points[:, 2].max())
     polygon = points[farthest, :2]
-    return Outline(name=NAME, kind="base", polygon=polygon, z_low=low, z_high=high)
+    return Outline(name=NAME, kind="base", polygon=polygon, z_low_m=low, z_high_m=high)
 
 
 def _base_points(cell: Cell, urdf: str) -> FloatArray | None:
