@@ -101,34 +101,34 @@ def axis_coordinates(low: float, high: float, count: int) -> FloatArray:
     return np.round(np.linspace(low, high, count), _DECIMALS) + 0.0
 
 
-def level_heights(low: float, high: float, step: float) -> FloatArray:
-    """Levels from ``low`` to ``high`` in steps; the last is at most ``high`` [m].
+def level_heights(low_m: float, high_m: float, step_m: float) -> FloatArray:
+    """Levels from the lowest up in steps; the last is at most ``high_m``.
 
-    A top level that rounding alone puts above ``high`` is kept.
+    A top level that rounding alone puts above ``high_m`` is kept.
 
     Examples
     --------
     >>> level_heights(-0.1, 0.2, 0.1).tolist()
     [-0.1, 0.0, 0.1, 0.2]
     """
-    count = int(np.floor((high - low) / step + 1e-6)) + 1
-    return np.round(low + step * np.arange(count), _DECIMALS) + 0.0
+    count = int(np.floor((high_m - low_m) / step_m + 1e-6)) + 1
+    return np.round(low_m + step_m * np.arange(count), _DECIMALS) + 0.0
 
 
-def cube_lattice(cube: CubeSpec, z_step: float) -> Lattice:
+def cube_lattice(cube: CubeSpec, z_step_m: float) -> Lattice:
     """Points of one cube of the workspace scan, in robot_base.
 
     Parameters
     ----------
     cube : CubeSpec
         Corners, and the number of points along x and y.
-    z_step : float
+    z_step_m : float
         Distance between levels [m].
     """
     return Lattice(
         x=axis_coordinates(cube.min[0], cube.max[0], cube.grid[0]),
         y=axis_coordinates(cube.min[1], cube.max[1], cube.grid[1]),
-        z=level_heights(cube.min[2], cube.max[2], z_step),
+        z=level_heights(cube.min[2], cube.max[2], z_step_m),
     )
 
 

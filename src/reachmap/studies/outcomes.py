@@ -126,7 +126,7 @@ def of_bin(record: BinMap) -> dict[str, Outcomes]:
         "bin_reachability": _share(frame, hit),
         "directions": _share(*_any(np.column_stack([place, axis]), hit)),
         "points": _share(*_any(place, hit)),
-        PATH_LENGTH: _mean(frame, table.path_length),
+        PATH_LENGTH: _mean(frame, table.path_length_rad),
     }
     return found | _of_best_paths(record, table, frame) | _emptied(record)
 

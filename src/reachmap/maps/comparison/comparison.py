@@ -189,7 +189,7 @@ def compare_maps(
         raise SettingsError(_nothing_common(before, frame, tolerance_m, tolerance_deg))
     was, now = a.status == Status.PATH_FOUND, b.status == Status.PATH_FOUND
     gained, lost = ~was & now, was & ~now
-    both = was & now & ~np.isnan(a.path_length) & ~np.isnan(b.path_length)
+    both = was & now & ~np.isnan(a.path_length_rad) & ~np.isnan(b.path_length_rad)
     _, place = np.unique(np.round(a.square / TOLERANCE_M), axis=0, return_inverse=True)
     p_value, low, high = clustered_shares(gained.astype(float) - lost, place.ravel())
     return Comparison(
@@ -207,8 +207,8 @@ def compare_maps(
         p_value=p_value,
         change_low=100.0 * low,
         change_high=100.0 * high,
-        path_length_before=_mean(a.path_length[both]),
-        path_length_after=_mean(b.path_length[both]),
+        path_length_before=_mean(a.path_length_rad[both]),
+        path_length_after=_mean(b.path_length_rad[both]),
         squares=_squares(a.square, was, now),
         losses=_causes(b, lost, after.body_pairs),
         gains=_causes(a, gained, before.body_pairs),

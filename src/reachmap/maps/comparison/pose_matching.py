@@ -44,7 +44,7 @@ class FrameTable:
         robot_base for a workspace map, of the grid in the bin frame for a bin map.
     status : uint8 array, shape (n,)
     blocking_pair : int array, shape (n,)
-    path_length : array, shape (n,)
+    path_length_rad : array, shape (n,)
         Mean over the attempts that found a path [rad], NaN without one.
     """
 
@@ -53,7 +53,7 @@ class FrameTable:
     square: FloatArray
     status: CodeArray
     blocking_pair: IntArray
-    path_length: FloatArray
+    path_length_rad: FloatArray
 
     def __post_init__(self) -> None:
         freeze(self)
@@ -176,7 +176,7 @@ def _cube_parts(record: WorkspaceMap) -> Sequence[FrameTable]:
                 square=points,
                 status=cube.status.ravel(),
                 blocking_pair=cube.blocking_pair.ravel(),
-                path_length=cube.path_length.ravel(),
+                path_length_rad=cube.path_length.ravel(),
             )
         )
     return parts
@@ -234,5 +234,5 @@ def _bin_part(record: BinMap, frame: Frame) -> FrameTable:
         square=square,
         status=record.status.ravel(),
         blocking_pair=record.blocking_pair.ravel(),
-        path_length=mean.ravel(),
+        path_length_rad=mean.ravel(),
     )

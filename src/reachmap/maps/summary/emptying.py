@@ -115,7 +115,7 @@ def emptying_of(record: BinMap) -> Emptying | None:
     )
 
 
-def volume_left(stuck: BoolArray, layer: FloatArray, depth: float) -> FloatArray:
+def volume_left(stuck: BoolArray, layer: FloatArray, depth_m: float) -> FloatArray:
     """Share of a full column that remains at each point, (nl, ny, nx) to (ny, nx).
 
     Parameters
@@ -125,10 +125,10 @@ def volume_left(stuck: BoolArray, layer: FloatArray, depth: float) -> FloatArray
     layer : array, shape (nl,)
         Heights of the levels, each of which stands for the parts nearer to it than to
         the others [m].
-    depth : float
+    depth_m : float
         Of the bin [m].
     """
-    tops = np.append((layer[1:] + layer[:-1]) / 2.0, max(depth, float(layer[-1])))
+    tops = np.append((layer[1:] + layer[:-1]) / 2.0, max(depth_m, float(layer[-1])))
     share = np.append(0.0, tops / tops[-1])
     count = np.arange(1, len(layer) + 1)[:, None, None]
     highest = np.where(stuck, count, 0).max(axis=0)

@@ -43,14 +43,14 @@ class LiftSurvey:
         Index into the map's ``body_pairs``, -1 where there is none.
     ways : Ways
         From the grasp to the end of the lift; empty without one.
-    above_rim : array, shape (goals,)
+    above_rim_m : array, shape (goals,)
         Height of the part's lowest point above the rim at its end [m]; NaN without one.
     """
 
     status: CodeArray
     blocking_pair: IntArray
     ways: Ways
-    above_rim: FloatArray
+    above_rim_m: FloatArray
 
     def __post_init__(self) -> None:
         freeze(self)
@@ -62,7 +62,7 @@ class LiftSurvey:
             status=_joined(parts, "status").astype(np.uint8),
             blocking_pair=_joined(parts, "blocking_pair").astype(np.int64),
             ways=Ways.join([part["ways"] for part in parts], dof),
-            above_rim=_joined(parts, "above_rim"),
+            above_rim_m=_joined(parts, "above_rim"),
         )
 
     @classmethod
@@ -72,7 +72,7 @@ class LiftSurvey:
             status=np.full(goals, StageStatus.NOT_ATTEMPTED, np.uint8),
             blocking_pair=np.full(goals, NO_PAIR, np.int64),
             ways=Ways(point=np.zeros((0, dof)), size=np.zeros(goals, np.int64)),
-            above_rim=np.full(goals, np.nan),
+            above_rim_m=np.full(goals, np.nan),
         )
 
     def with_lifts(self, others: LiftSurvey, rows: IntArray) -> LiftSurvey:
@@ -81,8 +81,8 @@ class LiftSurvey:
             return self
         status, pair = self.status.copy(), self.blocking_pair.copy()
         status[rows], pair[rows] = others.status, others.blocking_pair
-        above_rim = self.above_rim.copy()
-        above_rim[rows] = others.above_rim
+        above_rim_m = self.above_rim_m.copy()
+        above_rim_m[rows] = others.above_rim_m
         ways = [self.ways[k] for k in range(len(self.ways))]
         for k, row in enumerate(rows.tolist()):
             ways[row] = others.ways[k]
@@ -91,7 +91,7 @@ class LiftSurvey:
             status=status,
             blocking_pair=pair,
             ways=Ways.of(ways, dof),
-            above_rim=above_rim,
+            above_rim_m=above_rim_m,
         )
 
     def verdict(self, goals: IntArray) -> tuple[int, int]:

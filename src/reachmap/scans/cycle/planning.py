@@ -300,7 +300,7 @@ class CyclePlanner:
             way_in=best.way_in,
             paths=tuple(paths),
             cycle_time_s=best.in_s + sum(times) + spec.waits_s + image_s,
-            above_rim_m=float(self._lifts.above_rim[best.way_in.goal]),
+            above_rim_m=float(self._lifts.above_rim_m[best.way_in.goal]),
             roll_rad=self._survey.roll_of(grasp, best.way_in.goal),
         )
 
