@@ -25,6 +25,7 @@ from reachmap.plots.bin_map import (
 from reachmap.plots.causes import draw_causes
 from reachmap.plots.curves.saturation import draw_saturation
 from reachmap.plots.parts.bin_view import percent_after
+from reachmap.plots.parts.context import context_of
 from reachmap.plots.parts.squares import whole_percent
 from reachmap.plots.placement import draw_placement, placement_titles
 from reachmap.sampling.orientations import orientation_set
@@ -265,6 +266,33 @@ def test_placement_shows_bins_where_they_would_stand() -> None:
     words = " ".join(text.get_text() for text in figure.texts)
     assert "+x 120 mm, −x 80 mm, +yaw 23°, −yaw 20°" in words
     assert "1 the bin collides with pedestal" in words
+
+
+@pytest.mark.parametrize("near", [True, False])
+def test_what_the_bin_stands_on_is_drawn_and_named_once(near: bool) -> None:
+    """One entry and one outline, whether or not it is at the height of the level."""
+    placement = synthetic_placement()
+    body = next(
+        outline
+        for outline in context_of(placement.provenance).standing
+        if outline.kind == "body"
+    )
+    T = placement.bin_pose.copy()
+    T[2, 3] = body.z_high + (0.0 if near else 1.0)
+    poses = placement.candidate_pose.copy()
+    poses[0, 2] = T[2, 3]
+    placement = synthetic_placement(support=body.name, bin_pose=T, candidate_pose=poses)
+    figure = draw_placement(placement)
+    labels = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert [name for name in labels if body.name in name] == [f"{body.name} (support)"]
+    drawn = [
+        patch
+        for patch in figure.axes[0].patches
+        if isinstance(patch, Polygon)
+        and len(patch.get_xy()) == len(body.polygon) + 1
+        and np.allclose(patch.get_xy()[:-1], body.polygon)
+    ]
+    assert len(drawn) == 2  # the line, and the white one under it
 
 
 def test_directions_are_drawn_beside_frames_and_points() -> None:

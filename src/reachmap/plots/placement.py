@@ -101,16 +101,16 @@ def draw_placement(
             scale=PERCENT_SCALE,
             font_size=0.0,
         )
-        for outline in stack.shown(level):
-            draw_outline(panels[0], outline)
         said = f"on the map of path reachability, level {height_text(stack, level)}"
         panels[0].set_title(said, loc="left")
     marks = _draw_candidates(panels[-1], placement, percent_map)
     panels[-1].set_title(
         "best score at each place over z and yaw; dots: with the bin", loc="left"
     )
-    for outline in stack.shown(level):
-        draw_outline(panels[-1], outline)
+    standing = _standing(stack, level, placement.support)
+    for axes in panels:
+        for outline in standing:
+            draw_outline(axes, outline)
     handles = _draw_bins(panels[0], placement, context, camera_view)
     for axes in panels:
         axes.set_xlim(low[0], high[0])
@@ -121,7 +121,7 @@ def draw_placement(
     left = LEFT + (count - 1) * (width + GAP)
     bar = (left + width + 0.15, bottom, 0.16, height)
     colour_bar(figure, marks, bar, "Path reachability, score [%]")
-    _put_legend(figure, [*handles, *legend_lines(stack.shown(level))], bottom - 0.55)
+    _put_legend(figure, [*handles, *legend_lines(standing)], bottom - 0.55)
     _write_text(figure, placement, left, bottom - (0.75 if count == 2 else 1.70))
     title, subtitle = placement_titles(placement)
     put_title(figure, LEFT, title, f"{subtitle} · {context.bin_name}".rstrip(" ·"))
@@ -195,6 +195,18 @@ def _view(placement: BinPlacement, stack: LevelStack) -> tuple[FloatArray, Float
     return everything.min(axis=0), everything.max(axis=0)
 
 
+def _standing(stack: LevelStack, level: int, support: str | None) -> list[Outline]:
+    """What is near the level, and what the bin stands on, which is called that."""
+    near = stack.shown(level)
+    return [
+        dataclasses.replace(outline, name=f"{outline.name} (support)")
+        if support and outline.name == support
+        else outline
+        for outline in stack.outlines
+        if (support and outline.name == support) or any(o is outline for o in near)
+    ]
+
+
 def _draw_bins(
     axes: Axes,
     placement: BinPlacement,
@@ -214,11 +226,6 @@ def _draw_bins(
                 z_high_m=z,
             )
         )
-    outlines += [
-        dataclasses.replace(outline, name=f"{outline.name} (support)")
-        for outline in context.standing
-        if placement.support and outline.name == placement.support
-    ]
     for outline in outlines:
         draw_outline(axes, outline)
     _draw_bin_axis(axes, placement)
