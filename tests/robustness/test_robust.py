@@ -21,6 +21,7 @@ from reachmap.geometry import inverse_transform, quaternion_wxyz_from_rotation
 from reachmap.maps import read_bin_map
 from reachmap.maps.robustness.format import read_robustness
 from reachmap.motions.motion import best_rows, way_points
+from reachmap.plots.curves.robustness import draw_robustness
 from reachmap.robustness.errors import (
     Errors,
     ErrorSize,
@@ -31,6 +32,7 @@ from reachmap.robustness.errors import (
 from reachmap.tools.bin_scan import bin_scan
 from reachmap.tools.robust import robust
 from reachmap.tools.verify import verify
+from tests.support.optional import present
 
 # A finger reaches down to 10 mm above the walls of the bin, a shelf beside the arm
 # leaves it little room.
@@ -192,6 +194,18 @@ def test_the_command_reads_lengths_and_angles(toy, tmp_path):
     info = CliRunner().invoke(group, ["info", str(out)])
     assert "bin 5 mm and 1 deg, tool 2 mm off" in info.output
     assert (tmp_path / "r.png").stat().st_size > 10_000
+
+
+def test_the_legend_of_the_curve_is_beside_it(toy, tmp_path):
+    """No line can run through it: all of them are within the axes."""
+    record = robust(toy, tmp_path / "r.h5", errors=SIZES, samples=4)
+    figure = draw_robustness(record)
+    figure.draw_without_rendering()
+    legend, axes = figure.legends[0].get_window_extent(), figure.axes[0]
+    assert axes.get_legend() is None
+    assert not legend.overlaps(present(axes.get_tightbbox()))
+    assert figure.bbox.x0 < legend.x0 < legend.x1 < figure.bbox.x1
+    assert figure.bbox.y0 < legend.y0
 
 
 @pytest.mark.parametrize(

@@ -22,8 +22,8 @@ from reachmap.plots.parts.style import (
 def draw_robustness(record: Robustness) -> Figure:
     """Test grasps that stay reachable over multiples of the errors."""
     summary = summarise_robustness(record)
-    figure = new_figure(6.8, 4.6)
-    axes = axes_at(figure, 0.85, 0.62, 5.6, 3.15)
+    figure = new_figure(6.8, 5.1)
+    axes = axes_at(figure, 0.85, 1.12, 5.6, 3.15)
     scale = [step.scale for step in summary.steps]
     axes.fill_between(
         scale,
@@ -58,7 +58,8 @@ def draw_robustness(record: Robustness) -> Figure:
     axes.set_ylabel("test grasps [%]")
     grid_lines(axes)
     axes.set_axisbelow(True)
-    axes.legend(loc="lower left", fontsize=8.5, frameon=False)
+    # Below the axes: curves fall anywhere between them.
+    figure.legend(loc="lower left", bbox_to_anchor=(0.115, 0.02), ncols=2)
     for spine in ("top", "right"):
         axes.spines[spine].set_visible(False)
     given = summary.given
