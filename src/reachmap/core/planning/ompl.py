@@ -16,6 +16,7 @@ from reachmap._typing import FloatArray
 from reachmap.cell.model.planner import PlannerSpec
 from reachmap.core.collision.checker import CollisionChecker
 from reachmap.core.planning.motion import MotionChecker
+from reachmap.core.robot.model import RobotModel
 from reachmap.errors import EngineError
 
 _CLOCK_EVERY = 64
@@ -88,6 +89,40 @@ class Budget:
         self._begin += unpaid
 
 
+class Goals:
+    """Where a path may end; those that cannot be entered are left out.
+
+    Outside the limits is known beforehand, in collision when OMPL looks at a goal: it
+    is rare, as where a verified motion leads nearer to a body than the margin. Without
+    any goal left OMPL would wait for others until the budget ends.
+
+    Parameters
+    ----------
+    robot : RobotModel
+    goals : array, shape (m, dof)
+
+    Attributes
+    ----------
+    rows : array of int, shape (k,)
+        Those within the limits.
+    Q : array, shape (k, dof)
+    """
+
+    def __init__(self, robot: RobotModel, goals: FloatArray) -> None:
+        inside = ((goals >= robot.lower_rad) & (goals <= robot.upper_rad)).all(axis=1)
+        self.rows = np.flatnonzero(inside)
+        self.Q = goals[self.rows]
+        self._left = {q.tobytes() for q in self.Q}
+
+    def leave_out(self, q: FloatArray) -> None:
+        """Count a configuration in collision as no goal, if it was one."""
+        self._left.discard(q.tobytes())
+
+    def none_left(self) -> bool:
+        """Whether no goal can be entered."""
+        return not self._left
+
+
 ou.setLogLevel(ou.LogLevel.LOG_NONE)
 
 _OPTIMISING = frozenset(
@@ -134,7 +169,7 @@ class OmplSearch:
     def search(
         self,
         starts: FloatArray,
-        goals: FloatArray,
+        goals: Goals,
         seed: np.random.SeedSequence,
         budget: Budget,
     ) -> FoundPath | None:
@@ -143,8 +178,7 @@ class OmplSearch:
         Parameters
         ----------
         starts : array, shape (k, dof)
-        goals : array, shape (m, dof)
-            Within the limits.
+        goals : Goals
         seed : SeedSequence
             Of this search.
         budget : Budget
@@ -154,15 +188,23 @@ class OmplSearch:
         ou.RNG.setSeed(int(seed.generate_state(1)[0]) or 1)
         space = self._space()
         information = ob.SpaceInformation(space)
-        states = _States(self._motions.checker, goals)
-        information.setStateValidityChecker(states.is_valid)
+        checker, dof = self._motions.checker, range(starts.shape[1])
+
+        def is_valid(state: Any) -> bool:
+            q = np.array([state[i] for i in dof])
+            free = checker.is_free(q)
+            if not free:
+                goals.leave_out(q)
+            return free
+
+        information.setStateValidityChecker(is_valid)
         information.setMotionValidator(_MotionValidator(information, self._motions))
         information.setup()
         problem = ob.ProblemDefinition(information)
         for q in starts:
             problem.addStartState(_state(information, q))
         goal = ob.GoalStates(information)
-        for q in goals:
+        for q in goals.Q:
             goal.addState(_state(information, q))
         problem.setGoal(goal)
         if self._spec.name in _OPTIMISING:
@@ -174,7 +216,7 @@ class OmplSearch:
         planner.setup()
         planner.solve(
             ob.PlannerTerminationCondition(
-                lambda: states.no_goal_is_valid() or budget.search_ends()
+                lambda: goals.none_left() or budget.search_ends()
             )
         )
         if not problem.hasExactSolution():
@@ -219,28 +261,6 @@ class OmplSearch:
         return ob.RealVectorOrthogonalProjectionEvaluator(
             information.getStateSpace(), [cell_rad] * len(joints), joints.tolist()
         )
-
-
-class _States:
-    """Which states are free; knows when no goal is.
-
-    A goal that a verified motion leads to may be nearer to a body than the margin.
-    Where all of them are, OMPL would wait for others until the budget ends.
-    """
-
-    def __init__(self, checker: CollisionChecker, goals: FloatArray) -> None:
-        self._checker, self._dof = checker, range(goals.shape[1])
-        self._open_goals = {q.tobytes() for q in goals}
-
-    def is_valid(self, state: Any) -> bool:
-        q = np.array([state[i] for i in self._dof])
-        free = self._checker.is_free(q)
-        if not free:
-            self._open_goals.discard(q.tobytes())
-        return free
-
-    def no_goal_is_valid(self) -> bool:
-        return not self._open_goals
 
 
 class _MotionValidator(ob.MotionValidator):  # type: ignore[misc]

@@ -20,7 +20,7 @@ from reachmap._typing import FloatArray
 from reachmap.cell.model.planner import PlannerSpec
 from reachmap.core.memo import memoized_part
 from reachmap.core.planning.motion import MotionChecker
-from reachmap.core.planning.ompl import Budget, FoundPath, OmplSearch
+from reachmap.core.planning.ompl import Budget, FoundPath, Goals, OmplSearch
 from reachmap.core.planning.shortcut import shorten
 
 
@@ -122,10 +122,8 @@ class Planner:
     def _plan(
         self, start: FloatArray, goals: FloatArray, seed: int, max_checks: int | None
     ) -> PlanResult:
-        robot, starts = self.motions.checker.robot, np.atleast_2d(start)
-        inside = ((goals >= robot.lower_rad) & (goals <= robot.upper_rad)).all(axis=1)
-        rows = np.flatnonzero(inside)
-        goals = goals[rows]
+        starts = np.atleast_2d(start)
+        ends = Goals(self.motions.checker.robot, goals)
         budget = Budget(
             self.motions.checker,
             max_checks or self.spec.max_checks,
@@ -133,10 +131,10 @@ class Planner:
         )
         clock = _Clock()
         unverified, path = 0, None
-        for found in self._found(starts, goals, seed, budget):
+        for found in self._found(starts, ends, seed, budget):
             clock.end_search()
             with budget.paused():
-                path = self._shorten_and_verify(found, goals, seed)
+                path = self._shorten_and_verify(found, ends.Q, seed)
             clock.end_shortening()
             if path is not None:
                 break
@@ -145,7 +143,7 @@ class Planner:
             clock.end_search()
         return PlanResult(
             path=path,
-            goal=-1 if path is None else int(rows[_nearest_row(goals, path[-1])]),
+            goal=-1 if path is None else int(ends.rows[_nearest_row(ends.Q, path[-1])]),
             checks=budget.used(),
             planning_time_s=clock.search_wall_s,
             planning_cpu_time_s=clock.search_cpu_s,
@@ -156,17 +154,17 @@ class Planner:
         )
 
     def _found(
-        self, starts: FloatArray, goals: FloatArray, seed: int, budget: Budget
+        self, starts: FloatArray, goals: Goals, seed: int, budget: Budget
     ) -> Iterator[_Straight | FoundPath]:
         """Paths at the planning step, until the budget is spent."""
-        if not len(goals):
+        if goals.none_left():
             return
         if self.spec.straight_first:
             # Free, it is the shortest path there is: nothing is left to search for.
-            away = np.linalg.norm(goals - starts[:, None], axis=2)
+            away = np.linalg.norm(goals.Q - starts[:, None], axis=2)
             first, nearest = np.unravel_index(np.argmin(away), away.shape)
-            if self.motions.is_free(starts[first], goals[nearest]):
-                yield _Straight(np.array([starts[first], goals[nearest]]))
+            if self.motions.is_free(starts[first], goals.Q[nearest]):
+                yield _Straight(np.array([starts[first], goals.Q[nearest]]))
         seeds = np.random.SeedSequence(seed)
         allowance = self._first_allowance(budget)
         while not budget.spent():
