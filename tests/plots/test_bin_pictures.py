@@ -295,6 +295,31 @@ def test_what_the_bin_stands_on_is_drawn_and_named_once(near: bool) -> None:
     assert len(drawn) == 2  # the line, and the white one under it
 
 
+def test_all_that_is_written_below_a_placement_is_on_the_picture() -> None:
+    """Also with every margin and as many reasons as are shown."""
+    reasons = ("", *(f"the bin collides with body {k}" for k in range(6)))
+    count = len(reasons)
+    placement = synthetic_placement(
+        runner_up=-1,
+        paper_choice=-1,
+        candidate_pose=np.tile([0.5, 0.1, -0.05, 1.5], (count, 1)),
+        score=np.array([96.5] + [np.nan] * (count - 1)),
+        worst_point=np.array([70.0] + [np.nan] * (count - 1)),
+        reachable_share=np.array([96.0] + [np.nan] * (count - 1)),
+        exact=np.array([1] + [0] * (count - 1), np.uint8),
+        reason=reasons,
+        margin={f"{sign}{name}": 0.1 for name in "xyz" for sign in "+-"}
+        | {"+yaw": 0.4, "-yaw": 0.35},
+    )
+    figure = draw_placement(placement)
+    assert "1 the bin collides with body 3" in [
+        t.get_text().strip() for t in figure.texts
+    ]
+    for text in figure.texts:
+        assert figure.bbox.y0 <= text.get_window_extent().y0
+        assert text.get_window_extent().x1 <= figure.bbox.x1
+
+
 def test_directions_are_drawn_beside_frames_and_points() -> None:
     """Three panels whose titles are the shares that the summary states."""
     bin_map = make_bin_map(shape=(1, 3, 4), reachable=0.2)

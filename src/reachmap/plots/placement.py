@@ -48,7 +48,7 @@ from reachmap.plots.parts.style import (
 
 # Choices of layout: lengths on paper [in], and lines of text.
 LEFT, RIGHT, TOP, GAP = 0.80, 0.95, 1.05, 0.75
-BOTTOM = 2.0
+BOTTOM = 2.25
 WIDEST, TALLEST = 5.6, 6.2
 LINE = 0.19
 REASONS_SHOWN = 4
