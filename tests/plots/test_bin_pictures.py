@@ -278,7 +278,7 @@ def test_what_the_bin_stands_on_is_drawn_and_named_once(near: bool) -> None:
         if outline.kind == "body"
     )
     T = placement.bin_pose.copy()
-    T[2, 3] = body.z_high + (0.0 if near else 1.0)
+    T[2, 3] = body.z_high_m + (0.0 if near else 1.0)
     poses = placement.candidate_pose.copy()
     poses[0, 2] = T[2, 3]
     placement = synthetic_placement(support=body.name, bin_pose=T, candidate_pose=poses)
