@@ -154,6 +154,39 @@ def test_four_mistakes_are_four_lines(tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.parametrize(
+    ("right", "wrong", "path"),
+    [
+        ("  inner:", "  iner:", "bin.iner"),
+        ("  inner:", "  inside:", "bin.inside"),
+        ("bin:", "bni:", "bni"),
+        ("scan_configuration:", "scan_config:", "scan_config"),
+        ("robot:", "robto:", "robto"),
+        ("  urdf:", "  udrf:", "robot.udrf"),
+        ("    shape:", "    shap:", "bodies[post].shap"),
+    ],
+)
+def test_a_misspelt_key_is_one_line(
+    tmp_path: Path, right: str, wrong: str, path: str
+) -> None:
+    """It is not called missing as well; what else is missing still is."""
+    text = CELL.replace(right, wrong, 1)
+    assert text != CELL
+    with pytest.raises(CellError, match="did you mean") as caught:
+        read_cell(write(tmp_path, text))
+    key = right.strip().removesuffix(":")
+    (line,) = caught.value.lines
+    assert line.endswith(f": {path}: unknown key; did you mean {key!r}?")
+
+
+def test_a_key_that_no_other_is_like_is_missing(tmp_path: Path) -> None:
+    """Two mistakes, two lines."""
+    text = CELL.replace("  inner:", "  zzz:", 1)
+    with pytest.raises(CellError, match=r"bin\.inner: is missing") as caught:
+        read_cell(write(tmp_path, text))
+    assert len(caught.value.lines) == 2
+
+
 def test_files_that_are_missing_are_mistakes_with_places(tmp_path: Path) -> None:
     """URDF, SRDF, limits and meshes are all looked for before anything is said."""
     text = CELL.replace("urdf: mini.urdf", "urdf: none.urdf\n  srdf: none.srdf")

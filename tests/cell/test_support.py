@@ -68,12 +68,17 @@ def test_faces_of_tilted_boxes_and_spheres_are_none():
             ["bin.on=pedestal", "bin.pose.rpy_deg=[5,0,0]"],
             "so it cannot stand flat on",
         ),
+        (
+            ["bin.on=pedestal", "bin.pose.rpy_deg=[80,0,0]"],
+            "the bin is tilted 80 deg from upright in the world and would spill",
+        ),
     ],
 )
 def test_a_bin_that_cannot_stand_there_is_a_mistake(changes, words):
     """In one line, with what is wrong."""
-    with pytest.raises(CellError, match=words):
+    with pytest.raises(CellError, match=words) as told:
         read_cell(UR5, [TABLE, *changes])
+    assert len(told.value.lines) == 1
 
 
 def test_a_footprint_holds_the_walls():

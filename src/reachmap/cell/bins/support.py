@@ -156,6 +156,8 @@ def _on_support(
         document.add(where, _no_support(cell, str(name), every))
         return None
     tilt_deg = np.degrees(tilt_rad(T_world_bin[:3, :3]))
+    if tilt_deg > MAX_BIN_TILT_DEG:
+        return None  # told already
     if tilt_deg > STEADY_DEG:
         document.add(
             where,

@@ -37,11 +37,16 @@ def did_you_mean(word: str, choices: Collection[str]) -> str:
     if not choices:
         return ""
     choices = list(choices)
-    near = difflib.get_close_matches(word, choices, n=1, cutoff=0.5)
-    if near:
-        return f"did you mean {near[0]!r}?"
+    near = _nearest(word, choices)
+    if near is not None:
+        return f"did you mean {near!r}?"
     shown = ", ".join(choices[:20]) + (", …" if len(choices) > 20 else "")
     return f"known: {shown}"
+
+
+def _nearest(word: str, choices: Collection[str]) -> str | None:
+    near = difflib.get_close_matches(word, choices, n=1, cutoff=0.5)
+    return near[0] if near else None
 
 
 def _alternatives(kind: Any) -> list[Any]:
@@ -111,7 +116,14 @@ def add_validation_errors(
         (strip_tags(detail["loc"], document.data, detail["type"]), detail)
         for detail in error.errors(include_url=False)
     ]
+    meant = {
+        (*location[:-1], _nearest(str(location[-1]), known_keys(model, location[:-1])))
+        for location, detail in details
+        if detail["type"] == "extra_forbidden"
+    }
     for location, detail in details:
+        if detail["type"] == "missing" and location in meant:
+            continue  # given under a misspelt name, which is told
         if detail["type"] == "too_short" and any(
             inner[: len(location)] == location and len(inner) > len(location)
             for inner, _ in details
