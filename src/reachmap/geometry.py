@@ -118,7 +118,7 @@ def rotation_from_quaternion_wxyz(quaternion: npt.ArrayLike) -> FloatArray:
     q = np.asarray(quaternion, float)
     length = np.linalg.norm(q, axis=-1, keepdims=True)
     if not (length > 0).all():
-        raise ValueError("a quaternion of length 0 is no rotation")
+        raise ValueError("a quaternion of length 0 is not a rotation")
     w, x, y, z = np.moveaxis(q / length, -1, 0)
     R = [
         [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],

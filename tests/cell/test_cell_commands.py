@@ -217,7 +217,7 @@ def test_new_cell_disables_links_that_always_touch(tmp_path: Path) -> None:
     [
         (("none.urdf",), "not found"),
         ((UR5, "--tip", "tool1"), "no link 'tool1'; did you mean 'tool0'"),
-        ((UR5, "--base", "tool0"), "no joint that moves anything against 'tool0'"),
+        ((UR5, "--base", "tool0"), "no joint that moves anything relative to 'tool0'"),
         ((UR5, "--tip", "base"), "no joint moves between 'base_link' and 'base'"),
         ((UR5, "-o", "/nowhere/cell.yaml"), "does not exist"),
     ],

@@ -130,7 +130,7 @@ def test_info_hints_at_the_journal_of_an_unfinished_run(tmp_path: Path) -> None:
     journal.write_bytes(b'0123abcd {"format":"reachmap.journal","kind":"none"}\n')
     answer = run("info", tmp_path / "bin.h5")
     assert answer.exit_code == 2
-    assert "not finished; name bin.h5.journal to look" in answer.stderr
+    assert "unfinished run; name bin.h5.journal to see" in answer.stderr
     assert run("info", journal).exit_code == 2
 
 

@@ -214,7 +214,7 @@ def test_the_legend_of_the_curve_is_beside_it(toy, tmp_path):
         ([], "give an error"),
         (["--bin", "5"], "expected a number with its unit"),
         (["--bin", "5mm 3mm"], "one length and one angle"),
-        (["--camera", "1mm"], "there is no camera"),
+        (["--camera", "1mm"], "the cell has no camera"),
         (["--bin", "5mm", "--margin", "3mm"], "collision.safety_margin_m"),
         (["--bin", "5mm", "--samples", "1"], "--samples must be"),
     ],

@@ -84,7 +84,7 @@ def test_a_coarse_cell_has_fewer_points_and_the_same_rest() -> None:
 
 def test_an_optimiser_is_not_halved(tmp_path: Path) -> None:
     """It leaves out by itself."""
-    with pytest.raises(SettingsError, match="leaves out what is poor by itself"):
+    with pytest.raises(SettingsError, match="leaves out poor variants itself"):
         made(tmp_path / "s.h5", halving=True, optimise=4)
 
 

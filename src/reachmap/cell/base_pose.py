@@ -29,7 +29,7 @@ WORLD = "world"
 
 
 def base_links(loaded: LoadedCell) -> tuple[str, ...]:
-    """Links that do not move against robot_base."""
+    """Links that do not move relative to robot_base."""
     robot = loaded.robot
     frame = loaded.cell.robot.base_frame or robot.root
     link = frame if frame in robot.links else robot.joints[frame].child

@@ -48,7 +48,7 @@ def fragment_overrides(path: Path, cell_text: str, label: str) -> tuple[str, ...
     for name in data:
         if name not in sections or name in ("format", "format_version"):
             hint = did_you_mean(str(name), tuple(sections))
-            raise CellError(f"{path}: {name}: no section of an arm; {hint}")
+            raise CellError(f"{path}: {name}: not a section of an arm; {hint}")
     overrides = []
     for name, value in data.items():
         if name == NAMED and isinstance(value, list):

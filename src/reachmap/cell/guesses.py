@@ -70,7 +70,8 @@ def guess_tip(robot: UrdfDescription, base: str, joints: Collection[str] = ()) -
         longest = max(arms.values(), default=0)
     if not longest:
         raise SettingsError(
-            f"{robot.name}: the URDF has no joint that moves anything against {base!r}"
+            f"{robot.name}: the URDF has no joint that moves anything "
+            f"relative to {base!r}"
         )
     known = {
         link: arms[link]
@@ -92,7 +93,7 @@ def finger_joints(robot: UrdfDescription, base: str) -> set[str]:
 
 
 def joints_below(robot: UrdfDescription, base: str) -> set[str]:
-    """Joints that move something against the base."""
+    """Joints that move something relative to the base."""
     return {name for link in robot.links for name in robot.chain(base, link)}
 
 
@@ -163,7 +164,7 @@ class _Tree:
     Attributes
     ----------
     chains : mapping
-        Link to the joints that move it against the base, followers included; links
+        Link to the joints that move it relative to the base, with followers; links
         beside or above the base have none.
     below : mapping
         Link to the joints that it carries.

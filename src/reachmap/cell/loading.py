@@ -172,7 +172,9 @@ def cell_path(name_or_path: str) -> Path:
     if is_file(path):
         return path
     hint = did_you_mean(name_or_path, tuple(cells))
-    raise CellError(f"{name_or_path!r:.120} is no shipped cell and no file; {hint}")
+    raise CellError(
+        f"{name_or_path!r:.120} is neither a shipped cell nor a file; {hint}"
+    )
 
 
 def cell_from_json(

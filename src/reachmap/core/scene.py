@@ -58,7 +58,7 @@ class Scene:
     with_bin : bool
         Whether the bin is among the obstacles.
     load : Load
-        What hangs on the tool.
+        What the tool carries.
     """
 
     loaded: LoadedCell = field(repr=False)

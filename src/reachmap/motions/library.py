@@ -190,7 +190,7 @@ class MotionLibrary:
         rotation, quaternion_wxyz : array_like, shape (3, 3) or (4,), optional
             Full orientation of the TCP instead.
         check : bool
-            Whether the last piece is checked in the cell. Without, it is worked out
+            Whether the last piece is checked in the cell. Otherwise it is computed
             from the nearest test grasp alone and may collide.
 
         Returns

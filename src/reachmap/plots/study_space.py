@@ -46,7 +46,7 @@ LABEL = 12
 MOST_LABELS = 8
 # Letters of a parameter's name; by how much of the height equal lines are apart.
 NAME, ASIDE = 24, 0.025
-# Points of a front that are told, and the height of a line about one [in].
+# Points of a front that are listed, and the height of a line about one [in].
 MOST_NAMED, LINE = 8, 0.17
 
 

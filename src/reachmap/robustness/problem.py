@@ -258,7 +258,7 @@ def _camera_pose(loaded: LoadedCell, errors: Errors) -> FloatArray | None:
     if not (errors.camera.shift_m or errors.camera.turn_rad):
         return None
     if loaded.cell.camera is None:
-        raise SettingsError(f"{loaded.source}: --camera is off, but there is no camera")
+        raise SettingsError(f"{loaded.source}: --camera: the cell has no camera")
     scene = Scene.shared(loaded, with_bin=True)
     return Camera(scene.robot, loaded).T_base_camera(scene.scan_configuration)
 

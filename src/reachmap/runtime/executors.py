@@ -84,7 +84,7 @@ class WorkerProcess(ProcessPoolExecutor):
 
     def __init__(self) -> None:
         # Ended by a closed terminal, multiprocessing's own helper would be started
-        # anew, and print a traceback for each thing that it has not heard of.
+        # again, and print a traceback for each resource that it does not know.
         with _blocked(signal.SIGHUP):
             resource_tracker.ensure_running()
         spawn = multiprocessing.get_context("spawn")

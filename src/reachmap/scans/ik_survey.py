@@ -165,7 +165,7 @@ class Survey:
         return np.asarray(way + TURN_RAD * np.round((q - way[0]) / TURN_RAD))
 
     def roll_of(self, frame: int, goal: int) -> float:
-        """By how much the tool is turned at a goal, against its frame [rad]."""
+        """By how much the tool is turned at a goal, relative to its frame [rad]."""
         if self.roll is None or self.frame_roll is None:
             return 0.0
         turn = float(self.roll[goal] - self.frame_roll[frame])

@@ -46,7 +46,7 @@ if TYPE_CHECKING:
 FIRST_SHARE: Final = 0.1
 """Share of the grasps that are drawn anywhere."""
 ROUNDS: Final = 8
-"""How often the rest are chosen anew by what is known then."""
+"""Batches in which the rest are chosen, each by what is known by then."""
 CANDIDATES: Final = 8
 """Drawn for each that is chosen."""
 IN_DOUBT: Final = 0.45

@@ -219,7 +219,7 @@ class RouteAttempts:
         """State checks of a way round, tested at the planning step.
 
         What was tried before it was found, and how finely a stretch beside an obstacle
-        is verified, depend on where the network happens to lead, which is luck.
+        is verified, depend on where the network happens to lead, which is chance.
         """
         motions, before = self._scene.motions, self._scene.checker.checks
         for motion in zip(path[:-1], path[1:], strict=True):

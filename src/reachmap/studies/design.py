@@ -161,8 +161,8 @@ def _require_value(text: str, item: str) -> None:
     first, colon, _ = item.partition(":")
     if colon and _number(first) is not None:
         raise SettingsError(
-            f"--vary {text:.120}: {item!r:.60} is no range; expected NAME=LOW:HIGH:N, "
-            "alone, with finite numbers LOW and HIGH"
+            f"--vary {text:.120}: {item!r:.60} is not a range; expected "
+            "NAME=LOW:HIGH:N, alone, with finite numbers LOW and HIGH"
         )
     if _is_infinite(item):
         raise SettingsError(f"--vary {text:.120}: {item} is not a finite number")
@@ -249,7 +249,7 @@ def grid(factors: Sequence[Factor]) -> list[Variant]:
 
 
 def latin_hypercube(factors: Sequence[Factor], count: int, seed: int) -> list[Variant]:
-    """So many samples that each factor takes each part of its range once.
+    """Samples such that each factor takes each part of its range once.
 
     Parameters
     ----------

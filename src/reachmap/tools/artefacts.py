@@ -33,7 +33,7 @@ def read_artefact_or_journal(path: Path) -> tuple[Artefact | Result, bool]:
     journal = store_path(path)
     if not is_there(path) and is_store(journal):
         raise MapFileError(
-            f"{path}: no such file, but a run towards it is not finished; "
-            f"name {journal.name} to look at what is there"
+            f"{path}: no such file, but there is the journal of an unfinished run; "
+            f"name {journal.name} to see what it holds"
         )
     return read_artefact(path), True

@@ -34,7 +34,7 @@ TOOLS = (0.0, 0.5, 1.0, 2.0, 3.0)
 FLANGE_M = 0.02
 # A longer tool is as unusual as this many other places are.
 PLACES_PER_TOOL = 3
-# So many pairs of both are looked at before the best of them is taken.
+# Pairs of both that are looked at before the best of them is taken.
 MOST = 24
 # Height that an arm gets above with most of its configurations, as a quantile.
 LOW = 0.1

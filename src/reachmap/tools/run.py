@@ -63,7 +63,7 @@ def run_pipeline(
 
     What an earlier run left in the folder is kept where it was made from the same cell
     and from each other, and a scan that was interrupted goes on. Pictures, ranked list
-    and report are made anew.
+    and report are always made again.
 
     Parameters
     ----------

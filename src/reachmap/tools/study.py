@@ -161,7 +161,9 @@ def _factors(
     if samples is not None and optimise is not None:
         raise SettingsError("give --optimise or --latin-hypercube, not both")
     if halving and optimise is not None:
-        raise SettingsError("--halving: --optimise leaves out what is poor by itself")
+        raise SettingsError(
+            "--halving: not with --optimise, which leaves out poor variants itself"
+        )
     factors = factors_of(
         vary, base, sampled=samples is not None, optimised=optimise is not None
     )

@@ -114,7 +114,7 @@ def validate(
     sources : sequence of path
         Grasp lists; ``-`` is standard input.
     random : int, optional
-        So many grasps drawn from the mapped volume, as a list of their own.
+        Number of grasps to draw from the mapped volume, as a list of their own.
     settings : RankSettings, optional
     basis : CostBasis, optional
     list_format : ListFormat, optional

@@ -1,7 +1,7 @@
 """Planning to grasps over roadmaps of their own, as the map planned to its test grasps.
 
 Nothing of the map is used: the goals are those of the grasps themselves, the roadmaps
-are made anew with other seeds, and what neither of them connects is left to the cell's
+are made again with other seeds, and what neither of them connects is left to the cell's
 planner, so that a miss is never the verdict of one method.
 """
 

@@ -63,7 +63,7 @@ def write_out_bins(document: Document) -> None:
 
 
 def _without_names(document: Document, wanted: str | None) -> None:
-    """Judge a cell without bins by name; what is missing for that is told once."""
+    """Judge a cell without bins by name; what is missing for that is said once."""
     data = document.data
     if "bins" in data and at(data, "bin") is None:
         if not data["bins"]:

@@ -127,7 +127,7 @@ class UrdfDescription:
         yield link, None
 
     def fixed_to(self, link: str) -> dict[str, FloatArray]:
-        """Poses (4, 4) in a link of all links that never move against it."""
+        """Poses (4, 4) in a link of all links that never move relative to it."""
         poses = {link: np.eye(4)}
         fixed = [joint for joint in self.joints.values() if joint.type not in MOVING]
         # A link may be reached from either side; each pass adds one or ends it.

@@ -73,7 +73,7 @@ class BinFit:
     """Checks poses of the bin against static bodies and against the arm.
 
     A body may touch the bin from outside, as a table does that carries it, but not
-    reach into it. The arm keeps the cell's safety margin, as in every plan.
+    penetrate it. The arm keeps the cell's safety margin, as in every plan.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ class BinFit:
         out.
     empty : bool
         Whether what stands still may not be inside the bin either; a divider may,
-        as long as it does not reach into walls or bottom.
+        as long as it does not penetrate walls or bottom.
     name : str, optional
         Which of the other bins to check, in place of the one to pick from.
     """
@@ -133,9 +133,9 @@ class BinFit:
 def misplaced_bins(
     robot: RobotModel, loaded: LoadedCell
 ) -> Iterator[tuple[str, BinContact]]:
-    """Key of each bin that reaches into what stands still, and what it meets first.
+    """Key of each bin that penetrates what stands still, and what it meets first.
 
-    Two bins that reach into each other are told once.
+    Two bins that penetrate each other are reported once.
     """
     cell = loaded.cell
     contact = BinFit(robot, loaded, None, empty=False).contact(cell.T_base_bin())

@@ -94,7 +94,7 @@ def bin_placements(robot: RobotModel, loaded: LoadedCell) -> dict[str, FloatArra
 
 
 Load = Literal["empty", "lifted", "carried"]
-"""What hangs on the tool: nothing, the part still on what it lay on, or the part."""
+"""What the tool carries: nothing, the part still on its support, or the part."""
 
 
 def world_placements(robot: RobotModel, loaded: LoadedCell) -> dict[str, FloatArray]:
@@ -256,7 +256,7 @@ def _read_mesh(loaded: LoadedCell, key: str, owner: str, scale: Any) -> Solid:
 
 
 class _Builder:
-    """Adds bodies one by one, each paired with all that it moves against."""
+    """Adds bodies one by one, each paired with all that moves relative to it."""
 
     def __init__(self, robot: RobotModel) -> None:
         self.robot = robot

@@ -62,7 +62,7 @@ class ClearanceMeter:
         """Least distance of two bodies on a path.
 
         The path is halved until what lies between two configurations cannot be
-        closer, by the bound on how far a motion moves each pair against each other, so
+        closer, by the bound on how far a motion moves the bodies of each pair, so
         that no place is narrower by more than the tolerance.
 
         Parameters
@@ -111,7 +111,7 @@ class ClearanceMeter:
         -------
         Q : array, shape (ends, dof)
         travel_m : array, shape (ends, pairs)
-            Bound on the way of the bodies against each other, from the first end.
+            Bound on the relative motion of the bodies, from the first end.
         """
         Q = pieces(path, PIECE_RAD)
         half = 0.5 * np.diff(Q, axis=0)

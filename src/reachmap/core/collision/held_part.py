@@ -89,7 +89,7 @@ def _solid(loaded: LoadedCell, key: str, spec: PartSpec) -> Solid:
     try:
         return read_mesh(path.read_bytes(), path.suffix, mesh.scale)
     except (OSError, MeshError) as error:
-        raise SceneError(f"part: {path.name} is no mesh ({error})") from error
+        raise SceneError(f"part: {path.name} is not a mesh ({error})") from error
 
 
 def _hull_corners(points: FloatArray) -> FloatArray:

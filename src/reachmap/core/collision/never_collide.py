@@ -64,7 +64,7 @@ def pairs_that_never_collide(
 
 
 class PairMotion:
-    """How far the joints of the arm move two bodies against each other.
+    """How far the joints of the arm move two bodies relative to each other.
 
     Parameters
     ----------
@@ -90,7 +90,7 @@ class PairMotion:
         ]
 
     def between(self, pair: Any) -> tuple[IntArray, FloatArray]:
-        """Joints of the arm that move one body of a pair against the other.
+        """Joints of the arm that move one body of a pair relative to the other.
 
         Returns
         -------

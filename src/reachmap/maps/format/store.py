@@ -135,7 +135,7 @@ def store(path: Path, tree: Tree, layout: Layout, *, overwrite: bool = False) ->
 
 
 def load(path: Path, *layouts: Layout) -> tuple[Tree, Layout]:
-    """Read an artefact, checked from the bytes up to what its numbers say.
+    """Read an artefact, checked from its bytes up to the consistency of its numbers.
 
     Parameters
     ----------
@@ -211,7 +211,7 @@ def _renamed(path: str, leaf: Leaf) -> dict[str, Leaf]:
 
 
 def check_tree(tree: Tree, layout: Layout) -> list[str]:
-    """Check structure, then ranges, then what the numbers say to each other."""
+    """Check structure, then ranges, then the consistency of the numbers."""
     # What numbers say to each other can be asked of numbers in their ranges only.
     return (
         check_structure(tree, layout)

@@ -30,7 +30,7 @@ def estimate_text(objective: str, value: float, low: float, high: float) -> str:
 
 
 def digits_of(objective: str) -> int:
-    """Decimals that an objective is told with."""
+    """Decimals that an objective is written with."""
     return 1 if OBJECTIVES[objective] == "percent" else 3
 
 

@@ -42,8 +42,8 @@ _ROOT_KEYS: Final = (
 # What grasp sources call it, and how it is said here.
 _ORDER = "name the order of its numbers: quaternion_wxyz or quaternion_xyzw"
 _POSE = (
-    "a 4x4 is said as position, its last column, and rotation_matrix, its upper left "
-    "3x3"
+    "give a 4x4 matrix as position, its last column, and rotation_matrix, its upper "
+    "left 3x3"
 )
 _ROLL = (
     "a direction leaves the roll open; to fix it give quaternion_wxyz, quaternion_xyzw "

@@ -36,7 +36,7 @@ DESIGNS = {
 }
 BINS = {
     "kept": "The bin stands where each variant's cell has it.",
-    "placed": "The bin is placed anew for each variant.",
+    "placed": "The bin is placed again for each variant.",
 }
 
 

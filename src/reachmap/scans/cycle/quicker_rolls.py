@@ -1,9 +1,9 @@
 """Where the roll is free: rolls at which a whole cycle is quicker than as listed.
 
-The roll that a test grasp is listed with was chosen by nobody, and may take the wrist
-half-way round and back. For every roll and branch of the kinematics a time is known
-below which no cycle over it stays; a few configurations with the least of these times
-get a straight approach and a lift, and are goals of the cycle beside those at hand.
+The roll that a test grasp is listed with is arbitrary, and may take the wrist half-way
+round and back. For every roll and branch of the kinematics there is a lower bound on
+the time of a cycle; a few configurations with the least bounds get a straight approach
+and a lift, and are goals of the cycle beside those at hand.
 """
 
 from __future__ import annotations
@@ -33,8 +33,8 @@ if TYPE_CHECKING:
 
 # A choice: large enough for batches, small enough that workers end together.
 GROUPS_PER_UNIT = 100
-# A roll is worth a look where it promises a twentieth of the motion. Two goals of each
-# grasp are kept, should one have no way in; after so many tries no more is looked for.
+# A roll is tried where it promises to save a twentieth of the motion. Two goals of each
+# grasp are kept, should one have no way in; the search ends after this many tries.
 _WORTH, _KEPT, _MOST_TRIES = 0.95, 2, 6
 
 
@@ -143,11 +143,11 @@ def quicker_goals(
 def least_cycles_s(
     scenes: CycleScenes, Q: FloatArray, before: FloatArray, after: FloatArray
 ) -> FloatArray:
-    """Times below which cycles over grasps (n, dof) can hardly stay, shape (n,) [s].
+    """Nearly lower bounds on times of cycles over grasps (n, dof), shape (n,) [s].
 
     From the scan configuration to the grasp, on to where the part is put down, and
-    back: each joint has to go its way. Approach, lift and waits are left out, which
-    differ little from roll to roll.
+    back: each joint has to make its motion. Approach, lift and waits are left out,
+    which differ little from roll to roll.
     """
     start = scenes.empty.scan_configuration
     rest_s = scenes.least_times_s(start, after)

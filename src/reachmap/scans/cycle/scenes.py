@@ -64,9 +64,9 @@ class CycleScenes:
         return tuple(dict.fromkeys([*names, *lain_on]))
 
     def least_times_s(self, q: FloatArray, Q: FloatArray) -> FloatArray:
-        """Times below which no path between configurations stays, (n, dof) to (n,).
+        """Lower bounds on times of paths between configurations [s], (n, dof) to (n,).
 
-        Whatever the time law: each joint has to go its way, from rest to rest.
+        Whatever the time law: each joint has to make its motion, from rest to rest.
         """
         robot = self.empty.robot
         v, a = robot.velocity_rad_s, robot.acceleration_rad_s2
