@@ -125,7 +125,7 @@ def test_an_override_changes_the_carrier_of_a_stored_cell() -> None:
 
 @pytest.mark.parametrize("change", ["bin.carrier=5", "bin.carrier=[KLT-6428]"])
 def test_a_carrier_that_is_no_name_is_one_mistake(change: str) -> None:
-    """That the bin has no size then is not told as well."""
+    """That the bin has no size then is not reported as well."""
     with pytest.raises(CellError, match=r"bin\.carrier: expected text") as caught:
         cell_from_text(
             toy("  carrier: KLT-6428\n"),
@@ -136,7 +136,7 @@ def test_a_carrier_that_is_no_name_is_one_mistake(change: str) -> None:
     assert len(caught.value.lines) == 1
 
 
-def test_unknown_names_are_told_with_the_nearest() -> None:
+def test_unknown_names_are_reported_with_the_nearest() -> None:
     """One line that names file, line, key and the carrier that may be meant."""
     with pytest.raises(CellError) as caught:
         load("  carrier: KLT-6482\n")

@@ -130,7 +130,7 @@ def test_bins_that_meet_are_named(two):
 
 
 def test_bins_that_are_not_picked_from_are_looked_at_as_well(two):
-    """One in the pedestal, and two that meet, which are told once."""
+    """One in the pedestal, and two that meet, which are reported once."""
     inside = Scene.build(read_cell(two, ["bins.right.pose.xyz=[0.1, 0, -0.2]"]))
     (problem,) = inside.scan_problems()
     assert "bins.right.pose: bin" in problem
@@ -195,7 +195,7 @@ def test_mistakes_name_the_bin(two, change, message):
     ],
 )
 def test_bins_that_are_none_are_one_mistake(tmp_path, bins, message):
-    """That there is no bin to pick from, then, is not told as well."""
+    """That there is no bin to pick from, then, is not reported as well."""
     with pytest.raises(CellError, match=re.escape(message)) as caught:
         read_cell(write(tmp_path, f"{bins}\npick_from: left"))
     assert len(caught.value.lines) == 1

@@ -1,6 +1,6 @@
 """Each format, held against a file that was read and judged by a person.
 
-No package checks the syntax of URScript, KRL or RAPID. To write the files anew, after
+No package checks the syntax of URScript, KRL or RAPID. To write the files again, after
 a change that is meant: ``python -m tests.motions.test_formats``.
 """
 

@@ -124,7 +124,7 @@ def test_a_scene_refuses_a_bin_in_a_body_that_stands_still():
 
 
 def test_a_moved_bin_is_checked_like_one_that_was_built_there():
-    """Configurations and pairs are judged as in a scene that was built anew."""
+    """Configurations and pairs are judged as in a scene that was built again."""
     rng = np.random.default_rng(11)
     moving = Scene.build(SCENE.loaded, with_bin=True, bin_moves=True)
     for pose in ((0.5, 0.1, -0.1, 0.4), (0.3, -0.3, 0.3, 1.2)):

@@ -50,7 +50,7 @@ def small_figure() -> Figure:
 
 @pytest.mark.parametrize("name", [*PERCENT_MAPS, DIFFERENCE_MAP, COST_MAP, CHANGE_MAP])
 def test_numbers_stand_out_on_every_colour(name: str) -> None:
-    """WCAG AA asks for 4.5; the formula here is the standard's, written anew."""
+    """WCAG AA asks for 4.5; the formula here is the standard's, written again."""
     rgb = colour_map(name)(np.linspace(0.0, 1.0, 1001))[:, :3]
     for colour in [*rgb, colour_map(name)(np.ma.masked)[:3]]:
         linear = [

@@ -269,7 +269,7 @@ def test_walls_that_may_be_touched_leave_room() -> None:
         assert np.isfinite(ranking.cost[0]) == reached
 
 
-def test_a_grasp_beside_a_wall_is_told_by_those_that_have_room() -> None:
+def test_a_grasp_beside_a_wall_is_judged_by_those_that_have_room() -> None:
     """The nearest test grasp has no room for the part; the next one is asked."""
     bin_map = room_map(0.01)
     status = bin_map.cycle.status.copy()

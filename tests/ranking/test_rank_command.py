@@ -254,7 +254,7 @@ def test_the_story_of_a_reachable_grasp(folder):
 
 
 def test_the_story_of_an_unreachable_grasp(folder):
-    """The cause is told, and which two bodies touch."""
+    """The cause is named, and which two bodies touch."""
     grasps = ranked("pile-1.json")["grasps"]
     hit = [g for g in grasps if g["reachmap"]["status"] == "ik_in_collision"]
     story = run("pile-1.json", "--explain", hit[0]["id"]).stdout

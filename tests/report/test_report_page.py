@@ -165,7 +165,7 @@ def test_the_answers_are_those_of_the_maps(
     assert best["id"] in text
 
 
-def test_the_validation_is_told(finished_page: str) -> None:
+def test_the_validation_is_reported(finished_page: str) -> None:
     """Shares with intervals; what is null or empty is a dash."""
     text = Outline(finished_page).text
     assert "97.0 % (92.0 to 99.0)" in text
@@ -263,7 +263,7 @@ def test_names_cannot_put_anything_on_the_page(tmp_path: Path) -> None:
     ],
 )  # fmt: skip
 def test_strange_lists_do_not_stop_the_page(tmp_path: Path, document: str) -> None:
-    """A list is data from elsewhere: it is told, shown in part or left out."""
+    """A list is data from elsewhere: it is shown, in part or whole, or left out."""
     write_bin_map(tmp_path / "bin.h5", synthetic_bin_map(0.6, shape=(1, 2, 2, 3, 1)))
     for name in ("ranked.json", "validation.json"):
         (tmp_path / name).write_text(document)
@@ -322,7 +322,9 @@ def test_a_page_is_not_overwritten(finished_run: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("undrawn")
-def test_a_study_is_told_with_its_sentences(finished_run: Path, tmp_path: Path) -> None:
+def test_a_study_is_reported_with_its_sentences(
+    finished_run: Path, tmp_path: Path
+) -> None:
     """The best variant, by itself as well: then nothing else is asked for."""
     folder = tmp_path / "alone"
     folder.mkdir()

@@ -199,7 +199,7 @@ def test_a_wide_lane_survives_deaths_that_have_no_culprit(heals):
 
 
 def test_workers_that_die_while_getting_ready_are_replaced():
-    """An executor that heals itself but lost the job is started anew, without blame."""
+    """An executor that heals itself but lost the job is restarted, without blame."""
 
     class Forgetful(Cluster):
         def step(self):

@@ -401,7 +401,7 @@ def test_a_second_run_is_refused_while_the_first_writes(path):
         pass
 
 
-def test_a_journal_removed_while_waiting_for_its_lock_is_made_anew(path, monkeypatch):
+def test_a_journal_removed_while_waiting_for_its_lock_is_made_again(path, monkeypatch):
     """The lock of a file that was just unlinked by its owner is worth nothing."""
     fill(path, [0])
     lock = store_module._lock

@@ -38,7 +38,7 @@ def test_clear_rim_begins_above_the_rim(yaw):
     assert approach_distance_m(cell) == pytest.approx(deepest, abs=1e-6)
 
 
-def test_a_short_approach_is_told():
+def test_a_short_approach_is_reported():
     """The crate's own 50 mm end 130 mm below the rim, and check says so."""
     cell = read_cell(CRATE).cell
     depth = cell.bin.inner[2] - heights_m(cell).min()

@@ -265,7 +265,7 @@ def test_lifts_end_lower_where_something_is_above(room_mm, above_rim_mm):
     assert high - low == pytest.approx(rise, abs=1e-6)
 
 
-def test_lower_lifts_are_kept_and_told(tmp_path, toy):
+def test_lower_lifts_are_kept_and_reported(tmp_path, toy):
     """The map holds how far above the rim each ends; `info` counts the lower ones."""
     record = scan(tmp_path, roof(6.0), "drop_off=null", "bin_scan.grid=[3, 1]")
     above_m = record.lift_above_rim.ravel()

@@ -1,4 +1,4 @@
-"""Surveys and roadmaps that an earlier run left are not worked out again."""
+"""Surveys and roadmaps that an earlier run left are not computed again."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def interrupted(*arguments, **settings):
 
 
 def interrupt_after(function, count):
-    """Ctrl-C in the call after so many."""
+    """Ctrl-C in the call after this many."""
     calls = []
 
     def call(*arguments, **settings):
@@ -79,7 +79,7 @@ def test_a_workspace_scan_by_roadmap_goes_on(tmp_path, monkeypatch):
 
 @pytest.mark.usefixtures("blocks_of_50")
 def test_a_bin_scan_goes_on_in_its_survey(tmp_path, monkeypatch):
-    """Neither survey nor roadmap is worked out twice."""
+    """Neither survey nor roadmap is computed twice."""
     output = tmp_path / "b.h5"
     bin_scan(None, tmp_path / "whole.h5", cell="planar-toy", overrides=SMALL)
     with monkeypatch.context() as change:

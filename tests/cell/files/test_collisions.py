@@ -95,7 +95,7 @@ def test_links_that_can_be_seen_but_not_collide_are_named(tmp_path: Path) -> Non
     assert "never checked: l2" in warning
 
 
-def test_an_arm_without_shapes_of_any_kind_is_told(tmp_path: Path) -> None:
+def test_an_arm_without_shapes_of_any_kind_is_reported(tmp_path: Path) -> None:
     """Flat URDFs of kinematics alone have neither visuals nor collisions."""
     bare = robot(*ARM, link("l1"))
     (warning,) = load(tmp_path, bare, "l1", ["j1"]).warnings

@@ -122,7 +122,7 @@ def test_a_text_beyond_memory_is_stopped(
         expanded(path)
 
 
-def test_packages_that_find_found_are_told(tmp_path: Path) -> None:
+def test_packages_that_find_found_are_reported(tmp_path: Path) -> None:
     """new-cell writes them into the cell."""
     (tmp_path / "tools").mkdir()
     path = write(tmp_path / "arm.xacro", '<link name="$(find gripper)"/>')
@@ -131,7 +131,7 @@ def test_packages_that_find_found_are_told(tmp_path: Path) -> None:
     assert found.packages == {"gripper": str(tmp_path / "tools")}
 
 
-def test_of_the_warnings_those_are_told_that_matter(tmp_path: Path) -> None:
+def test_only_warnings_that_matter_are_reported(tmp_path: Path) -> None:
     """An include that matches nothing, once; redefined names are a matter of style."""
     inner = '<xacro:include filename="parts/*.xacro"/>' * 2
     inner += '<xacro:property name="pi" value="3"/>'

@@ -76,7 +76,7 @@ def test_wrong_limits_are_refused(limits: dict[str, object], message: str) -> No
         robot(serial_urdf(TWO), "link_2", limits={"acceleration_rad_s2": 1.0, **limits})
 
 
-def test_several_mistakes_are_told_at_once() -> None:
+def test_several_mistakes_are_reported_at_once() -> None:
     """Unknown joints, joints both locked and moving: one line each."""
     with pytest.raises(SceneError) as caught:
         ur5(

@@ -129,7 +129,7 @@ def test_quaternions_have_length_one() -> None:
 
 @pytest.mark.parametrize("kind", ["path", "ik", "ik_free"])
 def test_stitched_percentages_are_those_of_the_status(kind: str) -> None:
-    """Each of the three percentages is computed anew from the frames."""
+    """Each of the three percentages is computed again from the frames."""
     record = workspace()
     name = f"{kind}_reachability"
     values: Any = changed(getattr(record, name), (1, 2, 3), 12.5)

@@ -98,7 +98,7 @@ def test_picks_per_hour_of_a_bin_by_hand():
     assert made.low < made.picks_per_hour < made.high
 
 
-def test_cycles_are_told_drawn_and_reported():
+def test_cycles_are_printed_drawn_and_reported():
     """Text, pictures and blocks of the report; nothing for a map without cycles."""
     record = with_cycles()
     found: Any = summarise_cycle(record)
@@ -130,7 +130,7 @@ def test_cycles_are_told_drawn_and_reported():
     assert cycle_blocks(plain) is None
 
 
-def test_a_map_without_a_whole_cycle_is_told_drawn_and_reported():
+def test_a_map_without_a_whole_cycle_is_printed_drawn_and_reported():
     """Its cycles all end early; nothing is left to take a mean of."""
     record = with_cycles()
     assert record.cycle is not None
