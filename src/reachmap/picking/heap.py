@@ -154,7 +154,7 @@ class _Surface:
 
     @property
     def mean_m(self) -> float:
-        """Mean height [m]."""
+        """Mean height above the bottom, over all cells of the height map [m]."""
         return float(self._height.mean())
 
     def lay(

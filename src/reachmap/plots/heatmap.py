@@ -142,7 +142,7 @@ class BestFrame:
     dashes: tuple[float, tuple[float, ...]]
 
     def handle(self) -> Line2D:
-        """Line for a legend."""
+        """Line in the style of the frame, for a legend."""
         return Line2D(
             [],
             [],

@@ -165,7 +165,7 @@ def _means(terms: FloatArray) -> FloatArray:
 
 
 def term_label(name: str) -> str:
-    """A term in words."""
+    """A term in words, without its unit: ``path length`` for ``path_length``."""
     return name.removesuffix("_s").replace("_", " ")
 
 

@@ -28,12 +28,12 @@ class ErrorSize:
     turn_rad: float = 0.0
 
     def moves_m(self, reach_m: float) -> float:
-        """How far it moves a point that far from the centre of the turn, at most."""
+        """Furthest that it moves a point this far from the centre of the turn [m]."""
         turn = min(self.turn_rad, np.pi)
         return float(self.shift_m + 2.0 * np.sin(turn / 2.0) * reach_m)
 
     def scaled(self, scale: float) -> ErrorSize:
-        """A multiple of it."""
+        """Shift and turn times a factor."""
         return ErrorSize(shift_m=scale * self.shift_m, turn_rad=scale * self.turn_rad)
 
 
@@ -57,7 +57,7 @@ class Errors:
     tool: ErrorSize = ErrorSize()
 
     def scaled(self, scale: float) -> Errors:
-        """A multiple of all."""
+        """All shifts and turns times a factor."""
         return Errors(
             bin=self.bin.scaled(scale),
             camera=self.camera.scaled(scale),

@@ -128,7 +128,7 @@ class RobustnessProblem:
 
     @property
     def fillings(self) -> range:
-        """Numbers of the fillings."""
+        """Filling levels, counted from the lowest."""
         return range(len(self.replay.stored))
 
     def rows_of(self, filling: int) -> slice:

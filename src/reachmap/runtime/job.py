@@ -232,7 +232,7 @@ class Ticket:
 
 
 def ticket_for(job: Job) -> Ticket:
-    """Make the ticket of a job."""
+    """Ticket of a job, under a random key, with the versions of its engines."""
     return Ticket(key=secrets.token_hex(16), packages=engine_versions(), job=job)
 
 

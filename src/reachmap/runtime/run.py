@@ -274,7 +274,7 @@ class _Run:
         return self.store.payload(0, phase)
 
     def progress(self, phase: str) -> Progress:
-        """Report of a phase."""
+        """Progress report of a phase, under the label of the work."""
         label = (
             self.label if phase == UNITS else f"{self.label} {phase.replace('_', ' ')}"
         )

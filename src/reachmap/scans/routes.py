@@ -125,7 +125,7 @@ class Routes:
 
     @classmethod
     def from_payload(cls, payload: Mapping[str, Any]) -> Routes:
-        """Restore from a payload."""
+        """Undo :meth:`payload`."""
         network = payload["network"]
         return cls(
             paths=ShortestPaths(**payload["paths"]),

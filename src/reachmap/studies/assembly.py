@@ -113,7 +113,7 @@ def assemble(
 def _rows(
     document: Mapping[str, Any], payloads: Sequence[Any]
 ) -> tuple[Sequence[Any], list[Any]]:
-    """Rows and the payload of each."""
+    """Rows of the study in order, and the payload that each takes its numbers from."""
     if "rows" not in document:
         nothing = {
             "values": [np.nan] * len(document["parameter_names"]),

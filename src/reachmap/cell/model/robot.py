@@ -135,7 +135,7 @@ class MountSpec(Record):
 
     @property
     def body_length(self) -> float:
-        """Length of the body [m]."""
+        """Length of the body behind the base [m]; by default to the floor, or 0.1."""
         if self.length is not None:
             return self.length
         return self.height - self.gap if self.kind == "pedestal" else 0.1

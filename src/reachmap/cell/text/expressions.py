@@ -56,7 +56,7 @@ class Evaluator:
         self._open: list[str] = []
 
     def parameter(self, name: str) -> float:
-        """Value of a parameter."""
+        """Value of a parameter or constant by name; expressions are evaluated once."""
         if name in CONSTANTS:
             return CONSTANTS[name]
         if name not in self._parameters:

@@ -124,7 +124,7 @@ class StudySummary:
 
 
 def summarise_study(study: Study) -> StudySummary:
-    """Summarise a study."""
+    """Put effects, changes and the best variants of a study into numbers."""
     return StudySummary(
         design=study.design,
         bin_mode=study.bin_mode,

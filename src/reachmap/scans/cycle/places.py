@@ -68,7 +68,7 @@ class Places:
 
     @classmethod
     def from_payload(cls, payload: Mapping[str, Any]) -> Places:
-        """Restore from a payload."""
+        """Undo :meth:`payload`."""
         ways = {name: Ways(**payload[name]) for name in ("place", "retreat", "back")}
         return cls(**{**payload, **ways})
 

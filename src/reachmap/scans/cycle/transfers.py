@@ -51,7 +51,7 @@ class Hub:
 
     @classmethod
     def from_payload(cls, payload: Mapping[str, Any]) -> Hub:
-        """Restore from a payload."""
+        """Undo :meth:`payload`."""
         routes = Routes.from_payload(payload["routes"])
         return cls(place=int(payload["place"]), row=payload["row"], routes=routes)
 
