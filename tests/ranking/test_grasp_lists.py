@@ -108,7 +108,7 @@ def test_a_direction_may_have_any_length():
     np.testing.assert_allclose(grasps.directions, [[0, 0.6, -0.8]] * 4)
 
 
-def test_small_errors_of_rotations_are_mended_with_a_warning():
+def test_small_errors_of_rotations_are_corrected_with_a_warning():
     """Printed digits pass silently or with a warning; the result is a rotation."""
     quaternion = {"position": [0, 0, 0], "quaternion_wxyz": [0.999849, 0, 0, 0]}
     rough = {"position": [0, 0, 0], "quaternion_wxyz": [1.005, 0, 0, 0]}

@@ -239,7 +239,7 @@ class MotionLibrary:
         usable = (self._rows[points] >= 0) & (angle <= ALIKE_STEPS * spacing)
         pitch = float(table.pitch_m.max())
         far = (away[points, None] / pitch) ** 2 + (angle / spacing) ** 2
-        # Rolls of one direction are as far: the one of the shortest path comes first.
+        # Rolls of a direction are equally far: that of the shortest path comes first.
         length = table.means[points, :, 0]
         column, orientation = np.nonzero(usable)
         order = np.lexsort((length[usable], np.round(far[usable], 9)))[:TRIES]

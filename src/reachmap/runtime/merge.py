@@ -45,7 +45,7 @@ def merge_journals(
         if len(journals) < len(paths):
             raise SettingsError("a journal is named twice")
         check_together(journals)
-        # In the order of the shards, so that the order of the arguments is nothing.
+        # In the order of the shards: that of the arguments does not matter.
         in_order = sorted(journals.values(), key=lambda one: one.header.shard)
         kind = kind_named(in_order[0].header.kind, source=paths[0])
         results = Results(kind, in_order)

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 LINE_INTERVAL_S: Final = 30.0
 BAR_INTERVAL_S: Final = 0.1
 RATE_WINDOW_S: Final = 60.0
-# The time left is said once a rate has been watched for this long, and while its two
+# The time left is shown once a rate has been watched for this long, and while its two
 # halves agree to within this factor: a guess that jumps about is worse than none.
 STEADY_AFTER_S: Final = 5.0
 STEADY_FACTOR: Final = 2.0

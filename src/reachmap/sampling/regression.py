@@ -82,7 +82,7 @@ def tool_points(points: FloatArray, axes: FloatArray, lever_m: float) -> FloatAr
 
 def _matern(a: FloatArray, b: FloatArray, width: float) -> FloatArray:
     """Matérn kernel of smoothness 3/2, shape (n, m)."""
-    # In place: fresh arrays of this size cost more than what is worked out in them.
+    # In place: fresh arrays of this size cost more than what is computed in them.
     r = a @ b.T
     r *= -2.0
     r += (a**2).sum(axis=1)[:, None]

@@ -32,7 +32,7 @@ TURNS_TRIED = 4
 """Turns of one solution that a plan is given at once."""
 
 
-@dataclass(frozen=True, kw_only=True)  # no slots: it keeps what it works out
+@dataclass(frozen=True, kw_only=True)  # no slots: it keeps what it computes
 class Survey:
     """Goals of many test frames.
 

@@ -18,7 +18,7 @@ ROUND = 4
 LOCAL_SHARE = 0.5
 # A range without steps has neighbours at these shares of its width.
 STEPS = (0.1, 0.03, 0.01)
-# Asked so often for a variant that was not tried yet.
+# Times that the sampler is asked for a variant that was not tried yet.
 ASKED = 30
 Place = tuple[float, ...]
 

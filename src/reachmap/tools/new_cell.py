@@ -38,7 +38,7 @@ from reachmap.tools.bin_guess import ENOUGH, BinGuess, guess_bin, guess_notes
 from reachmap.tools.robot_source import RobotSource, read_source
 
 LABEL = "starter cell"
-# A named state is taken for the scan configuration if it looks down at least so much
+# A named state is taken for the scan configuration if it looks down at least this much
 # (cosine of 60 degrees).
 LOOKS_DOWN = 0.5
 # Thickness of a supposed tool [m]: that of the gripper in the starter cell's examples.

@@ -19,7 +19,7 @@ from reachmap.cell.text.messages import did_you_mean
 from reachmap.disk import is_folder
 from reachmap.errors import SettingsError
 
-# A cell may be moved together with what lies so near; what is farther is absolute.
+# A cell may be moved together with what lies this near; what is farther is absolute.
 NEAR_LEVELS = 2
 
 

@@ -157,7 +157,7 @@ def _on_support(
         return None
     tilt_deg = np.degrees(tilt_rad(T_world_bin[:3, :3]))
     if tilt_deg > MAX_BIN_TILT_DEG:
-        return None  # told already
+        return None  # reported already
     if tilt_deg > STEADY_DEG:
         document.add(
             where,

@@ -123,7 +123,7 @@ def add_validation_errors(
     }
     for location, detail in details:
         if detail["type"] == "missing" and location in meant:
-            continue  # given under a misspelt name, which is told
+            continue  # given under a misspelt name, which is reported
         if detail["type"] == "too_short" and any(
             inner[: len(location)] == location and len(inner) > len(location)
             for inner, _ in details

@@ -115,8 +115,8 @@ class CollisionChecker:
             [motion.between(pair)[1] for pair in bodies.geometry.collisionPairs]
         ).reshape(-1, robot.dof)
         # A motion that moves no point further than d moves the bodies of a pair by at
-        # most so much of d against each other: two neighbours at the wrist need not
-        # keep the distance that the camera needs from the floor.
+        # most this share of d relative to each other: two neighbours at the wrist need
+        # not keep the distance that the camera needs from the floor.
         self._shares = (self.pair_reach_m / self.reach_m).max(axis=1, initial=0.0)
         self.checks = 0
         self._pair_checkers: dict[tuple[int, str, int], PairChecker] = {}

@@ -212,7 +212,7 @@ def _renamed(path: str, leaf: Leaf) -> dict[str, Leaf]:
 
 def check_tree(tree: Tree, layout: Layout) -> list[str]:
     """Check structure, then ranges, then the consistency of the numbers."""
-    # What numbers say to each other can be asked of numbers in their ranges only.
+    # Only numbers that are in their ranges can be checked for consistency.
     return (
         check_structure(tree, layout)
         or check_ranges(tree, layout)

@@ -39,7 +39,7 @@ _ROOT_KEYS: Final = (
     "source",
     "grasps",
 )
-# What grasp sources call it, and how it is said here.
+# What grasp sources call it, and what it is called here.
 _ORDER = "name the order of its numbers: quaternion_wxyz or quaternion_xyzw"
 _POSE = (
     "give a 4x4 matrix as position, its last column, and rotation_matrix, its upper "

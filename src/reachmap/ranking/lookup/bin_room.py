@@ -33,7 +33,7 @@ from reachmap.ranking.lookup.queries import pose_matrix
 
 # Turns of the tool that are asked where any will do.
 _TURNS = 24
-# Grasps looked at together: some hundred megabytes for a part of many corners.
+# Grasps looked at together: some hundreds of megabytes for a part of many corners.
 _AT_ONCE = 500
 _ROUNDING_M = 1e-9
 # Corners of a cylinder's end face; inside it, so that what has no room surely has none.

@@ -24,7 +24,7 @@ from reachmap.ranking.lookup.table import TERMS, GraspTable
 from reachmap.ranking.terms import PLANNING, CycleSeconds
 
 LIKENESS: Final = "likeness"
-# Beyond half a grid diagonal sideways, and so far above or below the layers: grasp
+# Beyond half a grid diagonal sideways, and this far above or below the layers: grasp
 # points of a heap lie centimetres above and below the height that stands for them.
 SIDEWAYS_TOLERANCE_M: Final = 1e-3
 VERTICAL_TOLERANCE_M: Final = 0.05

@@ -12,7 +12,7 @@ import numpy as np
 from reachmap._typing import FloatArray, IntArray
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)  # no slots: it keeps what it works out
+@dataclass(frozen=True, kw_only=True, eq=False)  # no slots: it keeps what it computes
 class Ways:
     """Several ways through configurations.
 

@@ -45,7 +45,7 @@ _PATIENCE = 4
 _HOPEFUL = 1e-3
 _MORE = 4
 
-# Arms of so few joints need no table.
+# Arms of this few joints need no table.
 _FEW_JOINTS = 2
 
 # Poses per block, which bounds the memory.
