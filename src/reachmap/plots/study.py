@@ -8,11 +8,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from reachmap.maps.study.record import LOWER_IS_BETTER, OBJECTIVES, Study
+from reachmap.maps.study.record import LOWER_IS_BETTER, Study
 from reachmap.maps.study.words import (
-    UNIT_WORDS,
     changes_text,
     digits_of,
+    unit_of,
     value_texts,
 )
 from reachmap.maps.summary.study import MainEffect, main_effect
@@ -68,7 +68,7 @@ def draw_main_effects(study: Study, objective: int) -> Figure:
         _draw_effect(axes, effect, joined=study.design == "grid")
         if first is None:
             first = axes
-            axes.set_ylabel(f"{name} [{UNIT_WORDS[OBJECTIVES[name]]}]")
+            axes.set_ylabel(f"{name} [{unit_of(name)}]")
         else:
             axes.sharey(first)
             axes.tick_params(labelleft=False)
@@ -125,7 +125,7 @@ def draw_grid(
     width, height = SQUARE * len(values[0]), SQUARE * len(values[1])
     figure = new_figure(max(1.2 + width + 1.3, 5.2), 0.75 + height + HEAD)
     axes = axes_at(figure, 1.2, 0.75, width, height)
-    unit = UNIT_WORDS[OBJECTIVES[name]]
+    unit = unit_of(name)
     mesh = axes.pcolormesh(
         np.ma.masked_invalid(table),
         cmap=colour_map(percent_map if unit == "%" else "viridis"),
@@ -253,8 +253,7 @@ def _tile_words(study: Study, row: int) -> tuple[str, list[str]]:
         for word, marked in (("base", study.base), ("best", study.best))
         if marked == row
     ]
-    unit = UNIT_WORDS[OBJECTIVES[name]]
-    value = f"{study.objective[row, 0]:.{digits_of(name)}f} {unit}"
+    value = f"{study.objective[row, 0]:.{digits_of(name)}f} {unit_of(name)}"
     if name != "bin_reachability":
         value = f"{name} {value}"
     changes = changes_text(study, row) or study.assignment[row]

@@ -13,11 +13,11 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
 from reachmap._typing import BoolArray, FloatArray, IntArray
-from reachmap.maps.study.record import LOWER_IS_BETTER, OBJECTIVES, Study
+from reachmap.maps.study.record import LOWER_IS_BETTER, Study
 from reachmap.maps.study.words import (
-    UNIT_WORDS,
     changes_text,
     digits_of,
+    unit_of,
     value_texts,
 )
 from reachmap.plots.parts.squares import PERCENT_SCALE, colour_bar
@@ -116,8 +116,7 @@ def draw_pareto(study: Study, first: int, second: int) -> Figure:
         )  # fmt: skip
     for axis, name in ((axes.xaxis, names[0]), (axes.yaxis, names[1])):
         better = "less" if name in LOWER_IS_BETTER else "more"
-        unit = UNIT_WORDS[OBJECTIVES[name]]
-        axis.set_label_text(f"{name} [{unit}], {better} is better")
+        axis.set_label_text(f"{name} [{unit_of(name)}], {better} is better")
     axes.margins(0.08)
     axes.grid(color="#e4e4e4", linewidth=0.7)
     axes.set_axisbelow(True)
@@ -168,7 +167,7 @@ def draw_parallel(
     percent_map : str
     """
     name = study.objective_names[objective]
-    unit = UNIT_WORDS[OBJECTIVES[name]]
+    unit = unit_of(name)
     value = study.objective[:, objective]
     known = study.done & ~np.isnan(value)
     count = len(study.parameter_names)
@@ -232,7 +231,7 @@ def _draw_lines(
             zorder=4 if best else 2,
         )
     _label_axes(axes, study, order, height)
-    unit, digits = UNIT_WORDS[OBJECTIVES[name]], digits_of(name)
+    unit, digits = unit_of(name), digits_of(name)
     for at, end in {
         float(height[row, -1]): value[row] for row in order[[0, -1]]
     }.items():
@@ -280,7 +279,7 @@ def draw_interactions(
     percent_map : str
     """
     name = study.objective_names[objective]
-    unit = UNIT_WORDS[OBJECTIVES[name]]
+    unit = unit_of(name)
     value = study.objective[:, objective]
     known = study.done & ~np.isnan(value)
     pairs = list(itertools.combinations(range(len(study.parameter_names)), 2))

@@ -22,11 +22,16 @@ def estimate_text(objective: str, value: float, low: float, high: float) -> str:
     """
     if math.isnan(value):
         return NONE
-    digits, unit = digits_of(objective), UNIT_WORDS[OBJECTIVES[objective]]
+    digits, unit = digits_of(objective), unit_of(objective)
     text = f"{_number(value, digits)} {unit}"
     if math.isnan(low):
         return text
     return f"{text} ({_number(low, digits)} to {_number(high, digits)})"
+
+
+def unit_of(objective: str) -> str:
+    """Unit of an objective as people read it: ``%``, ``rad`` or ``s``."""
+    return UNIT_WORDS[OBJECTIVES[objective]]
 
 
 def digits_of(objective: str) -> int:
