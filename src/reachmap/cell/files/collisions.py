@@ -167,16 +167,22 @@ def _numbers(element: ElementTree.Element, key: str, count: int) -> list[float]:
     text = element.get(key)
     if text is None:
         raise ValueError(f"<{element.tag}> needs {key}")
-    try:
-        values = [float(word) for word in text.split()]
-    except ValueError:
-        values = []
-    if len(values) != count or not all(map(math.isfinite, values)):
+    values = finite_numbers(text, count)
+    if values is None:
         numbers = "a finite number" if count == 1 else f"{count} finite numbers"
         raise ValueError(
             f"<{element.tag} {key}>: expected {numbers} (got {text[:40]!r})"
         )
     return values
+
+
+def finite_numbers(text: str, count: int) -> list[float] | None:
+    """Numbers of an attribute; None unless there are ``count``, all of them finite."""
+    try:
+        values = [float(word) for word in text.split()]
+    except ValueError:
+        return None
+    return values if len(values) == count and all(map(math.isfinite, values)) else None
 
 
 def _triple(text: str) -> Triple:

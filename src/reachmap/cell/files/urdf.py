@@ -18,6 +18,7 @@ from reachmap.cell.files.collisions import (
     NO_ORIGIN,
     LinkShape,
     Origin,
+    finite_numbers,
     links_without_collision,
     read_collisions,
 )
@@ -386,13 +387,7 @@ def _number_faults(root: ElementTree.Element) -> list[str]:
     for tag, key, count in _NUMERIC:
         for element in root.iter(tag):
             text = element.get(key)
-            if text is None:
-                continue
-            try:
-                values = [float(word) for word in text.split()]
-            except ValueError:
-                values = []
-            if len(values) != count or not all(map(math.isfinite, values)):
+            if text is not None and finite_numbers(text, count) is None:
                 faults.append(
                     f"<{tag} {key}>: expected {count} finite numbers "
                     f"(got {text[:40]!r})"
