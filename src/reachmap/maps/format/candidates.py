@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from typing import Any, Final, Protocol
 
 import numpy as np
@@ -113,6 +114,19 @@ def unpacked(tree: Tree) -> dict[str, Any]:
     reasons = tree.attributes["reasons"]
     reason = tuple(str(reasons[code]) for code in tree.array("reason"))
     return {"reason": reason, "margin": margin}
+
+
+def shown_margin(margin: Mapping[str, float]) -> dict[str, float]:
+    """Margin with its turns in degrees: direction to how far [m or deg]."""
+    return {
+        direction: float(np.degrees(value)) if is_turn(direction) else float(value)
+        for direction, value in margin.items()
+    }
+
+
+def excluded_counts(reason: Sequence[str]) -> dict[str, int]:
+    """Reasons to exclude candidates with their counts, the most frequent first."""
+    return dict(Counter(text for text in reason if text).most_common())
 
 
 def is_turn(direction: str) -> bool:

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
 
 from reachmap.maps.base.record import BasePlacement
-from reachmap.maps.format.candidates import is_turn
+from reachmap.maps.format.candidates import (
+    excluded_counts,
+    is_turn,
+    shown_margin,
+)
 from reachmap.text import plural
 
 
@@ -80,7 +83,6 @@ def summarise_base(placement: BasePlacement) -> BaseSummary:
     if present is not None and present.exact:
         gain = chosen.score - present.score
         gain_error = float(np.hypot(chosen.score_error, present.score_error))
-    reasons = Counter(reason for reason in placement.reason if reason)
     return BaseSummary(
         rail=placement.rail,
         chosen=chosen,
@@ -93,10 +95,7 @@ def summarise_base(placement: BasePlacement) -> BaseSummary:
         ),
         gain=gain,
         gain_error=gain_error,
-        margin={
-            k: float(np.degrees(v)) if is_turn(k) else v
-            for k, v in placement.margin.items()
-        },
+        margin=shown_margin(placement.margin),
         scan_configuration=dict(
             zip(
                 placement.joint_names,
@@ -106,7 +105,7 @@ def summarise_base(placement: BasePlacement) -> BaseSummary:
         ),
         candidates=len(placement.reason),
         exact=int((placement.exact > 0).sum()),
-        excluded=dict(reasons.most_common()),
+        excluded=excluded_counts(placement.reason),
     )
 
 

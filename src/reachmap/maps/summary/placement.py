@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
 
 from reachmap._typing import FloatArray
-from reachmap.maps.format.candidates import is_turn
+from reachmap.maps.format.candidates import excluded_counts, shown_margin
 from reachmap.maps.records import BinPlacement
 
 
@@ -79,16 +78,13 @@ def summarise_placement(record: BinPlacement) -> PlacementSummary:
         chosen=_candidate(record, record.chosen),
         runner_up=_candidate_or_none(record, record.runner_up),
         paper_choice=_candidate_or_none(record, record.paper_choice),
-        margin={
-            name: float(np.degrees(value)) if is_turn(name) else float(value)
-            for name, value in record.margin.items()
-        },
+        margin=shown_margin(record.margin),
         scan_configuration_deg=dict(
             zip(record.joint_names, degrees.tolist(), strict=True)
         ),
         candidates=len(record.score),
         exact=int(record.exact.sum()),
-        excluded=dict(Counter(text for text in record.reason if text).most_common()),
+        excluded=excluded_counts(record.reason),
         tolerance_shift_m=None if tolerance is None else tolerance[0],
         tolerance_turn_deg=turn_deg,
         worst_score=_of_chosen(record, record.worst_score),
