@@ -320,13 +320,12 @@ def _choice_settings(choice: RobotChoice) -> dict[str, Any]:
 
 
 def _draw(path: Path, placement: BasePlacement, run: RunOptions) -> None:
-    from reachmap.plots.base import draw_base
-    from reachmap.plots.parts.files import write_picture
+    from reachmap.plots.albums import base_album
+    from reachmap.plots.parts.files import write_only_picture
 
-    write_picture(
+    write_only_picture(
         path,
-        draw_base(placement),
-        title="Where the robot goes",
+        base_album(placement),
         config_sha256=placement.stamp.config_sha256,
         overwrite=run.overwrite,
     )

@@ -185,13 +185,12 @@ def _record(
 
 
 def _draw(path: Path, record: Robustness, run: RunOptions) -> None:
-    from reachmap.plots.curves.robustness import draw_robustness
-    from reachmap.plots.parts.files import write_picture
+    from reachmap.plots.albums import robustness_album
+    from reachmap.plots.parts.files import write_only_picture
 
-    write_picture(
+    write_only_picture(
         path,
-        draw_robustness(record),
-        title="Reachability over the errors of the cell",
+        robustness_album(record),
         config_sha256=record.stamp.config_sha256,
         overwrite=run.overwrite,
     )

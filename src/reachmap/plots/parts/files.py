@@ -105,6 +105,24 @@ def write_picture(
     return publish(path, [data], overwrite=overwrite)
 
 
+def write_only_picture(
+    path: Path,
+    album: Iterable[Picture | Table],
+    *,
+    config_sha256: str,
+    overwrite: bool = False,
+) -> Path:
+    """Write the one picture of an album to a file; see :func:`write_picture`."""
+    (picture,) = (item for item in album if isinstance(item, Picture))
+    return write_picture(
+        path,
+        picture.draw(),
+        title=picture.title,
+        config_sha256=config_sha256,
+        overwrite=overwrite,
+    )
+
+
 def level_table(x: FloatArray, y: FloatArray, values: FloatArray) -> str:
     """CSV of one level as the picture shows it: the largest y in the first row.
 
