@@ -23,13 +23,14 @@ from reachmap.plots.parts.squares import (
     draw_squares,
 )
 from reachmap.plots.parts.style import (
-    BIN_COLOUR,
+    INTERVAL_LOOK,
     MUTED,
     NOT_ATTEMPTED,
     PercentMap,
     axes_at,
     colour_map,
     drawing,
+    grid_lines,
     ink_on,
     new_figure,
     put_text,
@@ -84,18 +85,14 @@ def _draw_effect(axes: Axes, effect: MainEffect, *, joined: bool) -> None:
         effect.mean,
         yerr=np.nan_to_num([effect.mean - effect.low, effect.high - effect.mean]),
         fmt="-o" if joined and not choice else "o",
-        color=BIN_COLOUR,
-        linewidth=1.6,
-        markersize=5,
-        capsize=4,
-        elinewidth=1.2,
+        **INTERVAL_LOOK,
     )
     if choice or len(effect.values) <= MOST_LABELS:
         axes.set_xticks(effect.values, [text[:LABEL] for text in effect.labels])
         axes.tick_params(axis="x", labelrotation=30 * (len(effect.values) > 4))
     axes.margins(x=0.12, y=0.15)
     axes.set_xlabel(_axis_title(effect))
-    axes.grid(axis="y", color="#e4e4e4", linewidth=0.7)
+    grid_lines(axes)
     axes.set_axisbelow(True)
     for spine in ("top", "right"):
         axes.spines[spine].set_visible(False)

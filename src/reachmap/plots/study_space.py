@@ -32,6 +32,7 @@ from reachmap.plots.parts.style import (
     colour_map,
     drawing,
     fit_width,
+    grid_lines,
     ink_on,
     new_figure,
     put_text,
@@ -118,7 +119,7 @@ def draw_pareto(study: Study, first: int, second: int) -> Figure:
         better = "less" if name in LOWER_IS_BETTER else "more"
         axis.set_label_text(f"{name} [{unit_of(name)}], {better} is better")
     axes.margins(0.08)
-    axes.grid(color="#e4e4e4", linewidth=0.7)
+    grid_lines(axes, "both")
     axes.set_axisbelow(True)
     axes.legend(frameon=False, fontsize=7.5)
     _name_front(figure, axes, study, columns, order)

@@ -10,8 +10,8 @@ from reachmap.maps.records import BinMap
 from reachmap.maps.summary.statistics import Saturation, saturation_of
 from reachmap.plots.parts.bin_view import view_of
 from reachmap.plots.parts.style import (
-    BIN_COLOUR,
     INK,
+    INTERVAL_LOOK,
     MUTED,
     axes_at,
     drawing,
@@ -55,11 +55,7 @@ def _draw_curve(axes: Axes, data: Saturation) -> None:
         data.share,
         yerr=[data.share - data.low, data.high - data.share],
         fmt="-o",
-        color=BIN_COLOUR,
-        linewidth=1.6,
-        markersize=5,
-        capsize=4,
-        elinewidth=1.2,
+        **INTERVAL_LOOK,
     )
     # The curve never falls, so there is room to the lower right of every point.
     named = np.arange(len(data.attempts))[:: -(-len(data.attempts) // MOST_NAMED)]

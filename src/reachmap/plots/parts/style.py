@@ -108,6 +108,13 @@ def subtitle_of(parts: Iterable[str]) -> str:
     return " · ".join(part for part in parts if part)
 
 
+INTERVAL_LOOK: dict[str, Any] = {
+    "color": BIN_COLOUR, "linewidth": 1.6, "markersize": 5, "capsize": 4,
+    "elinewidth": 1.2,
+}  # fmt: skip
+"""Points of a curve with their intervals, for ``errorbar``."""
+
+
 def grid_lines(axes: Axes, axis: Literal["both", "x", "y"] = "y") -> None:
     """Draw pale lines across a curve's axes."""
     axes.grid(axis=axis, color="#e4e4e4", linewidth=0.7)
