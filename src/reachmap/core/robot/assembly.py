@@ -89,57 +89,80 @@ def moving_joints(
     model: Any, spec: RobotSpec, urdf: UrdfJoints, chain: Sequence[str]
 ) -> list[str]:
     """Joints that move by themselves, in chain order."""
-    wanted = chain if spec.joints is None else spec.joints
+    chosen = chain if spec.joints is None else spec.joints
     locked = spec.locked_joints_deg
-    problems = [
-        f"robot.joints: {name!r} does not move the TCP (joints: {', '.join(chain)})"
-        for name in wanted
-        if name not in chain
+    wanted = [name for name in chain if name in chosen]
+    moving = [
+        name for name in wanted if name not in locked and name not in urdf.followers
     ]
-    if spec.joints is not None:
-        problems += [
-            f"robot.locked_joints_deg: joint {name!r} is also in robot.joints"
-            for name in spec.joints
-            if name in locked
-        ]
+    problems = [
+        *_wrongly_chosen(spec, chain),
+        *_of_several_degrees(spec, urdf),
+        *_unknown_locked(model, locked),
+        *_coupled(urdf, wanted, moving, chain, locked),
+        *_locked_out_of_range(urdf, locked),
+    ]
+    if not moving:
+        problems.append("robot.joints: no joint is left that moves")
+    if problems:
+        raise SceneError(problems)
+    return moving
+
+
+def _wrongly_chosen(spec: RobotSpec, chain: Sequence[str]) -> list[str]:
+    chosen = spec.joints or ()
+    return [
+        f"robot.joints: {name!r} does not move the TCP (joints: {', '.join(chain)})"
+        for name in chosen
+        if name not in chain
+    ] + [
+        f"robot.locked_joints_deg: joint {name!r} is also in robot.joints"
+        for name in chosen
+        if name in spec.locked_joints_deg
+    ]
+
+
+def _of_several_degrees(spec: RobotSpec, urdf: UrdfJoints) -> list[str]:
+    """Floating and planar joints between base and TCP."""
     way = urdf.description.way(
         spec.base_frame or urdf.description.root, spec.tcp.parent
     )
-    problems += [
+    return [
         f"robot.urdf: joint {joint.name!r} between base and TCP has type "
         f"{joint.type!r}; only fixed, {', '.join(MOVING)} joints are supported there "
         f"(robot.base_frame: {joint.child} leaves it out)"
         for joint in way
         if joint.type in FREE_JOINTS
     ]
+
+
+def _unknown_locked(model: Any, locked: Mapping[str, float]) -> list[str]:
     names = list(model.names)[1:]
-    problems += [
+    return [
         f"robot.locked_joints_deg: no joint {name!r} (joints: {', '.join(names)})"
         for name in locked
         if name not in names
     ]
-    moving = [
-        name
-        for name in chain
-        if name in wanted and name not in locked and name not in urdf.followers
-    ]
-    problems += [
+
+
+def _coupled(
+    urdf: UrdfJoints,
+    wanted: Sequence[str],
+    moving: Sequence[str],
+    chain: Sequence[str],
+    locked: Mapping[str, float],
+) -> list[str]:
+    """Joints of the chain that another one drives, unless one of the two is locked."""
+    return [
         f"robot.urdf: joint {name!r} is between base and TCP and follows "
         f"{leader.leader!r}; arms with coupled joints are not supported (one of the "
         "two can be locked in robot.locked_joints_deg)"
         for name, leader in urdf.followers.items()
         # A leader beside the chain is driven, too: the arm has an axis there.
         if name in wanted
-        and name in chain
         and (leader.leader in moving or leader.leader not in chain)
         and not {name, leader.leader} & set(locked)
     ]
-    problems += _locked_out_of_range(urdf, locked)
-    if not moving:
-        problems.append("robot.joints: no joint is left that moves")
-    if problems:
-        raise SceneError(problems)
-    return moving
 
 
 def _locked_out_of_range(urdf: UrdfJoints, locked: Mapping[str, float]) -> list[str]:
