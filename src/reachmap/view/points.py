@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -11,7 +11,7 @@ from reachmap._typing import BoolArray, CodeArray, FloatArray, IntArray
 from reachmap.geometry import transform_points
 from reachmap.maps.format.registry import Artefact
 from reachmap.maps.parts import freeze
-from reachmap.maps.records import BinMap, BinPlacement, Status, WorkspaceMap
+from reachmap.maps.records import BinMap, BinPlacement, CubeMap, Status, WorkspaceMap
 from reachmap.maps.summary.statistics import STATUS_NAMES
 from reachmap.plots.parts.levels import level_names
 
@@ -139,15 +139,25 @@ def _workspace_points(record: WorkspaceMap) -> MapPoints:
     )
     point = point.ravel()
     position = position[:, ::-1]
-    counts = [cube.status.shape[-1] for cube in cubes]
+    own = np.split(point, np.cumsum([len(w) for w in where])[:-1])
+    frames = _frames_of_cubes(cubes, own)
+    z, level = np.unique(position[:, 2], return_inverse=True)
+    return MapPoints(
+        position=transform_points(record.T_base_grid, position),
+        level=level.ravel(),
+        levels=tuple(f"z = {name} m" for name in level_names(z)),
+        shares=_shares(frames, len(position)),
+        frames=frames,
+        size_m=0.16 * _spacing(position),
+    )
+
+
+def _frames_of_cubes(cubes: Sequence[CubeMap], points: Sequence[IntArray]) -> Frames:
+    """Test frames of all cubes, sorted by the number of their point."""
     owner = np.concatenate(
         [
-            np.repeat(part, count)
-            for part, count in zip(
-                np.split(point, np.cumsum([len(w) for w in where])[:-1]),
-                counts,
-                strict=True,
-            )
+            np.repeat(own, cube.status.shape[-1])
+            for own, cube in zip(points, cubes, strict=True)
         ]
     )
     order = np.argsort(owner, kind="stable")
@@ -160,7 +170,7 @@ def _workspace_points(record: WorkspaceMap) -> MapPoints:
         for cube in cubes
     ]
     goals = [cube.goal_configuration.reshape(cube.status.size, -1) for cube in cubes]
-    frames = Frames(
+    return Frames(
         point=owner[order],
         status=all_of("status").astype(np.uint8),
         pair=all_of("blocking_pair").astype(np.int64),
@@ -169,15 +179,6 @@ def _workspace_points(record: WorkspaceMap) -> MapPoints:
         path=np.full(len(order), -1, np.int64),
         solved=all_of("n_ik") > 0,
         free=all_of("n_ik_free") > 0,
-    )
-    z, level = np.unique(position[:, 2], return_inverse=True)
-    return MapPoints(
-        position=transform_points(record.T_base_grid, position),
-        level=level.ravel(),
-        levels=tuple(f"z = {name} m" for name in level_names(z)),
-        shares=_shares(frames, len(position)),
-        frames=frames,
-        size_m=0.16 * _spacing(position),
     )
 
 

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from reachmap.maps.robustness.record import Robustness
-from reachmap.maps.robustness.summary import errors_text, summarise_robustness
+from reachmap.maps.robustness.summary import (
+    RobustnessSummary,
+    errors_text,
+    summarise_robustness,
+)
 from reachmap.plots.parts.style import (
     BIN_COLOUR,
     INK,
@@ -24,6 +29,32 @@ def draw_robustness(record: Robustness) -> Figure:
     summary = summarise_robustness(record)
     figure = new_figure(6.8, 5.1)
     axes = axes_at(figure, 0.85, 1.12, 5.6, 3.15)
+    _draw_curves(axes, summary)
+    axes.axvline(1.0, color=MUTED, linewidth=1.0)
+    axes.set_xlim(0.0, summary.steps[-1].scale)
+    axes.set_ylim(0.0, 104.0)
+    axes.set_xlabel(f"size of the errors; 1 is {errors_text(summary.errors)}")
+    axes.set_ylabel("test grasps [%]")
+    grid_lines(axes)
+    axes.set_axisbelow(True)
+    # Below the axes: curves fall anywhere between them.
+    figure.legend(loc="lower left", bbox_to_anchor=(0.115, 0.02), ncols=2)
+    for spine in ("top", "right"):
+        axes.spines[spine].set_visible(False)
+    given = summary.given
+    put_title(
+        figure,
+        0.85,
+        f"{given.reachability:.1f} % of the test grasps survive, "
+        f"{given.certified:.1f} % for certain",
+        f"{errors_text(summary.errors)} off; of {summary.steps[0].reachability:.1f} % "
+        "without errors",
+    )
+    return figure
+
+
+def _draw_curves(axes: Axes, summary: RobustnessSummary) -> None:
+    """What is certified, free in every cell, and free on average with its range."""
     scale = [step.scale for step in summary.steps]
     axes.fill_between(
         scale,
@@ -51,24 +82,3 @@ def draw_robustness(record: Robustness) -> Figure:
             clip_on=False,
             label=words,
         )
-    axes.axvline(1.0, color=MUTED, linewidth=1.0)
-    axes.set_xlim(0.0, scale[-1])
-    axes.set_ylim(0.0, 104.0)
-    axes.set_xlabel(f"size of the errors; 1 is {errors_text(summary.errors)}")
-    axes.set_ylabel("test grasps [%]")
-    grid_lines(axes)
-    axes.set_axisbelow(True)
-    # Below the axes: curves fall anywhere between them.
-    figure.legend(loc="lower left", bbox_to_anchor=(0.115, 0.02), ncols=2)
-    for spine in ("top", "right"):
-        axes.spines[spine].set_visible(False)
-    given = summary.given
-    put_title(
-        figure,
-        0.85,
-        f"{given.reachability:.1f} % of the test grasps survive, "
-        f"{given.certified:.1f} % for certain",
-        f"{errors_text(summary.errors)} off; of {summary.steps[0].reachability:.1f} % "
-        "without errors",
-    )
-    return figure

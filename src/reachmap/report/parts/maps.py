@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
+from reachmap._typing import FloatArray
 from reachmap.maps.records import BinMap, BinPlacement, WorkspaceMap
 from reachmap.maps.summary.bin import MEASURES, BinSummary, summarise_bin
 from reachmap.maps.summary.evidence import EvidenceSummary
@@ -34,6 +37,7 @@ from reachmap.ranking.lookup.table import table_from_bin_map
 from reachmap.report.blocks import (
     Blocks,
     Heading,
+    Picture,
     Section,
     Strong,
     Table,
@@ -180,45 +184,54 @@ def _excluded(summary: PlacementSummary) -> Blocks:
     ]
 
 
+def _layer_pictures(
+    record: BinMap, cost: FloatArray, layer: int, where: str
+) -> Iterator[Picture]:
+    """Pictures of a layer; ``where`` names it in the captions of several."""
+    if record.margins is not None:
+        yield drawn(
+            draw_clearance(record, layer),
+            f"Clearance on the path to the grasp{where} [mm].",
+            record,
+        )
+    yield drawn(
+        draw_reachability(record, layer),
+        f"Path reachability at each point{where}.",
+        record,
+    )
+    yield drawn(
+        draw_directions(record, layer),
+        "A pick needs only one roll and one direction: the share of test "
+        f"grasps, of directions and of points that are reached{where}.",
+        record,
+    )
+    yield drawn(
+        draw_approach(record, layer),
+        f"Which approach directions and rolls work where{where}.",
+        record,
+    )
+    yield drawn(
+        draw_costs(record, cost, layer),
+        f"Costs{where}: path length, planning and execution time, and J.",
+        record,
+    )
+
+
 def bin_section(record: BinMap) -> Section:
     """Reachability, attempts, costs and approach directions inside the bin."""
     summary = summarise_bin(record)
     grasps = table_from_bin_map(record)
     cost = columns_of(grasps, RankSettings()).costs().reshape(grasps.shape)
-    pictures = []
-    for layer, name in enumerate(level_names(record.layer)):
-        where = f" in the layer {name} m above the bottom" if summary.layers > 1 else ""
-        if record.margins is not None:
-            pictures.append(
-                drawn(
-                    draw_clearance(record, layer),
-                    f"Clearance on the path to the grasp{where} [mm].",
-                    record,
-                )
-            )
-        pictures += [
-            drawn(
-                draw_reachability(record, layer),
-                f"Path reachability at each point{where}.",
-                record,
-            ),
-            drawn(
-                draw_directions(record, layer),
-                "A pick needs only one roll and one direction: the share of test "
-                f"grasps, of directions and of points that are reached{where}.",
-                record,
-            ),
-            drawn(
-                draw_approach(record, layer),
-                f"Which approach directions and rolls work where{where}.",
-                record,
-            ),
-            drawn(
-                draw_costs(record, cost, layer),
-                f"Costs{where}: path length, planning and execution time, and J.",
-                record,
-            ),
-        ]
+    pictures = [
+        picture
+        for layer, name in enumerate(level_names(record.layer))
+        for picture in _layer_pictures(
+            record,
+            cost,
+            layer,
+            f" in the layer {name} m above the bottom" if summary.layers > 1 else "",
+        )
+    ]
     return section(
         "bin",
         "What is reached inside the bin",
