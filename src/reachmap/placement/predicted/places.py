@@ -119,12 +119,11 @@ def _best_at(
     prediction: Prediction, iy: int, ix: int, reason_against: Callable[[Pose], str]
 ) -> Candidate:
     grid = prediction.grid
-    score = np.round(prediction.score[:, :, iy, ix], 6)
-    by_yaw = np.argsort(-score, axis=0, kind="stable")
-    tried = [(int(k), iz) for iz in range(len(grid.z)) for k in by_yaw[:, iz]]
-    tried.sort(key=lambda place: -score[place])
+    # Of equal scores the lowest height comes first, then the smallest yaw.
+    score = np.round(prediction.score[:, :, iy, ix].T, 6)
     first = ""
-    for k, iz in tried:
+    for nth in np.argsort(-score, axis=None, kind="stable").tolist():
+        iz, k = divmod(nth, len(grid.yaw))
         pose = (
             float(grid.x[ix]),
             float(grid.y[iy]),
