@@ -22,6 +22,8 @@ from reachmap.placement.predicted.places import apart_m
 from reachmap.placement.predicted.region import Region
 from reachmap.placement.problem import PlacementProblem
 from reachmap.placement.search import decide_by_search
+from reachmap.placement.steadying import worst_of
+from reachmap.placement.tolerance import Tolerance
 from tests.support.closed_form_evaluator import ClosedForm
 from tests.support.optional import present
 from tests.support.scenes import scene_of
@@ -219,5 +221,32 @@ def test_the_bin_keeps_out_of_the_drop_off(caplog):
     best = decision.table.rows[decision.ranked[0]].pose
     assert not room.taken(asked.T_base_bin(best))
     assert "leaves no room at the drop-off belt" in asked.reason_against(summit)
-    decide_as_given(asked, summit)
+    given = decide_as_given(asked, summit)
     assert "--bin-pose: the bin leaves no room at the drop-off belt" in caplog.text
+    tolerance = Tolerance(shift_m=0.03, turn_rad=0.05)
+    asked = dataclasses.replace(asked, tolerance=tolerance)
+    assert worst_of(asked, given.table.rows[0]).score == 0.0
+
+
+def test_a_bin_may_not_get_into_the_drop_off_when_it_is_off():
+    """Neighbours and margins end where the part is put down, as the search does."""
+    part = "part={shape: {box: [0.04, 0.04, 0.06]}, pose: {xyz: [0, 0, 0.03]}}"
+    down = "pose: {xyz: [0.5, 0.5, 0.1], rpy_deg: [180, 0, 0]}"
+    drop_off = f"drop_off={{name: belt, frame: robot_base, {down}}}"
+    room = DropOffRoom(scene_of(UR5, part, drop_off, with_bin=False))
+    tolerance = Tolerance(shift_m=0.03, turn_rad=0.05)
+    asked = dataclasses.replace(
+        problem(lambda pose: 90.0), drop_offs=room, tolerance=tolerance
+    )
+    y = next(
+        y
+        for y in np.arange(0.45, 0.0, -0.01).round(2).tolist()
+        if not asked.reason_against((0.5, y, 0.0, 0.0))
+    )
+    beside, away = (asked.exact([(0.5, at, 0.0, 0.0)])[0] for at in (y, y - 0.1))
+    assert worst_of(asked, beside).score == 0.0
+    assert worst_of(asked, away).score == 90.0
+    decision = decide_as_given(asked, away.pose)
+    margin = settle(asked, decision).margin
+    assert margin["+y"] == 0.1
+    assert margin["-y"] == 0.15

@@ -111,7 +111,7 @@ def decide_as_given(problem: PlacementProblem, pose: Pose) -> Decision:
     contact = problem.fit.contact(problem.T_base_bin(pose))
     if contact is not None:
         raise SceneError(f"--bin-pose: {contact.pair}")
-    taken = problem.without_drop_off(problem.T_base_bin(pose))
+    taken = problem.without_drop_off(pose)
     if taken:
         logger.warning("--bin-pose: %s", taken)
     decision = Decision()
@@ -271,7 +271,7 @@ def _margins(problem: PlacementProblem, pose: Pose, q: FloatArray) -> dict[str, 
     return margins(
         pose,
         q,
-        lambda moved: fit.contact(problem.T_base_bin(moved)) is None,
+        lambda moved: not problem.obstruction(moved, fit),
         problem.evaluator,
     )
 

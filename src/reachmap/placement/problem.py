@@ -110,21 +110,33 @@ class PlacementProblem:
             overhang = self._overhang(pose)
             if overhang:
                 return overhang
-        T_base_bin = self.T_base_bin(pose)
-        contact = self.fit.contact(T_base_bin)
-        if contact is not None:
-            return contact.reason
-        taken = self.without_drop_off(T_base_bin)
-        if taken:
-            return taken
+        obstruction = self.obstruction(pose)
+        if obstruction:
+            return obstruction
         if self.still_camera is None:
             return ""
-        seen = is_in_picture(self.loaded.cell, self.still_camera, T_base_bin)
+        seen = is_in_picture(
+            self.loaded.cell, self.still_camera, self.T_base_bin(pose)
+        )
         return "" if seen else OUT_OF_SIGHT
 
-    def without_drop_off(self, T_base_bin: FloatArray) -> str:
+    def obstruction(self, pose: Pose, fit: BinFit | None = None) -> str:
+        """What the bin would collide with, or leave no room for, at a pose; or "".
+
+        Parameters
+        ----------
+        pose : (x, y, z [m], yaw [rad])
+        fit : BinFit, optional
+            With the arm somewhere else than :attr:`fit` has it.
+        """
+        contact = (fit or self.fit).contact(self.T_base_bin(pose))
+        return self.without_drop_off(pose) if contact is None else contact.reason
+
+    def without_drop_off(self, pose: Pose) -> str:
         """Say which drop-off the bin leaves no room at, or ""."""
-        taken = "" if self.drop_offs is None else self.drop_offs.taken(T_base_bin)
+        if self.drop_offs is None:
+            return ""
+        taken = self.drop_offs.taken(self.T_base_bin(pose))
         return f"the bin leaves no room at the drop-off {taken}" if taken else ""
 
     def support(self, pose: Pose) -> str:

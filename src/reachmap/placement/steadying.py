@@ -81,7 +81,7 @@ def worst_of(problem: PlacementProblem, candidate: Candidate) -> WorstCase:
         candidate,
         problem.tolerance,
         problem.start,
-        lambda pose: _is_possible(problem, pose),
+        lambda pose: not problem.obstruction(pose),
         problem.evaluator,
     )
 
@@ -91,10 +91,6 @@ def _looked_at(
 ) -> tuple[Candidate, WorstCase]:
     worst = worst_of(problem, candidate)
     return dataclasses.replace(candidate, worst=worst.score), worst
-
-
-def _is_possible(problem: PlacementProblem, pose: Pose) -> bool:
-    return problem.fit.contact(problem.T_base_bin(pose)) is None
 
 
 def _moved(
@@ -179,7 +175,7 @@ def _directions_lost(problem: PlacementProblem, candidate: Candidate) -> int:
     of paths and approaches; the margin of what is chosen is measured with them.
     """
     poses = [moved_by(candidate.pose, step) for step in problem.tolerance.steps()]
-    possible = [pose for pose in poses if _is_possible(problem, pose)]
+    possible = [pose for pose in poses if not problem.obstruction(pose)]
     problem.evaluator.expect(1 + len(possible))
     here, *found = problem.evaluator.evaluate(
         [candidate.pose, *possible], problem.start, above=NEVER, grid=QUICK
