@@ -82,6 +82,11 @@ def axis_rotations(axis: str, angles_rad: FloatArray) -> FloatArray:
     return R
 
 
+def axis_turns(axis: str, angles_rad: FloatArray) -> FloatArray:
+    """:func:`axis_rotations` as transforms, shape (n, 4, 4)."""
+    return transform_from_parts(axis_rotations(axis, angles_rad), np.zeros(3))
+
+
 def transform_points(T: FloatArray, points: FloatArray) -> FloatArray:
     """Points (..., 3) of a frame in another one, by its pose T there, (4, 4)."""
     return np.asarray(points @ T[:3, :3].T + T[:3, 3])

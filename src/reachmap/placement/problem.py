@@ -115,9 +115,7 @@ class PlacementProblem:
             return obstruction
         if self.still_camera is None:
             return ""
-        seen = is_in_picture(
-            self.loaded.cell, self.still_camera, self.T_base_bin(pose)
-        )
+        seen = is_in_picture(self.loaded.cell, self.still_camera, self.T_base_bin(pose))
         return "" if seen else OUT_OF_SIGHT
 
     def obstruction(self, pose: Pose, fit: BinFit | None = None) -> str:

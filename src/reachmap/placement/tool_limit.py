@@ -13,7 +13,7 @@ from reachmap._typing import BoolArray, FloatArray
 from reachmap.core.collision.bin_fit import ToolFit
 from reachmap.core.collision.static_bodies import PlacedBody, box_around
 from reachmap.geometry import AXES
-from reachmap.placement.mapped.sample import frames_in_bin, rolls_of
+from reachmap.placement.mapped.sample import frames_in_bin, rolled
 
 if TYPE_CHECKING:
     from reachmap.cell.loading import LoadedCell
@@ -61,14 +61,13 @@ def tool_limit(robot: RobotModel, loaded: LoadedCell, is_open: BoolArray) -> Too
     T = frames_in_bin(loaded.cell).transforms_at(rows)
     fit, axis = ToolFit(robot, loaded), loaded.cell.robot.tcp.approach_axis
     tool = fit.bodies
-    rolls = rolls_of(loaded.cell)
     hit = fit.first_hit(T, tool)
     culprit = int(np.bincount(hit[hit >= 0], minlength=1).argmax())
     front = _front_most(tool, axis)
 
     def gain(T_changed: FloatArray, bodies: Sequence[PlacedBody]) -> float:
-        rolled = (T_changed[:, None] @ rolls).reshape(-1, 4, 4)
-        free = fit.first_hit(rolled, bodies) < 0
+        equivalent = rolled(loaded.cell, T_changed).reshape(-1, 4, 4)
+        free = fit.first_hit(equivalent, bodies) < 0
         freed = float(free.reshape(len(T), -1).any(axis=1).mean())
         return round(freed * (100.0 - percent), 2)
 

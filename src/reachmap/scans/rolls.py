@@ -11,7 +11,7 @@ import numpy as np
 from reachmap._typing import FloatArray, IntArray
 from reachmap.cell.model.robot import FREE, ToolSpec
 from reachmap.core.kinematics.windings import TURN_RAD
-from reachmap.geometry import AXES, axis_rotations
+from reachmap.geometry import AXES, axis_turns
 from reachmap.maps.records import NO_PAIR, Status
 from reachmap.maps.summary.directions import same_direction
 from reachmap.sampling.frames import FrameGrid
@@ -91,9 +91,7 @@ class RollGroups:
 
     def turned(self, groups: IntArray, turns: FloatArray, axis: str) -> FloatArray:
         """Poses of groups at some rolls, shape (groups · rolls, 4, 4)."""
-        T_roll = np.tile(np.eye(4), (len(turns), 1, 1))
-        T_roll[:, :3, :3] = axis_rotations(axis, turns)
-        T = self.T[groups][:, None] @ T_roll
+        T = self.T[groups][:, None] @ axis_turns(axis, turns)
         return np.asarray(T.reshape(-1, 4, 4))
 
     def share_goals(self, survey: Survey) -> Survey:

@@ -11,11 +11,11 @@ from reachmap._typing import BoolArray, FloatArray, IntArray
 from reachmap.cell.model.cell import IkSpec
 from reachmap.core.kinematics.any_roll import AnyRollSolver, has_own_roll
 from reachmap.core.kinematics.follow import Follower, follow_many
-from reachmap.core.kinematics.solutions import within_limits
+from reachmap.core.kinematics.solutions import Rows, within_limits
 from reachmap.core.kinematics.solvers.choice import Arm, BranchSolver, choose_solver
 from reachmap.core.robot.chain import SerialChain
 from reachmap.core.robot.model import RobotModel
-from reachmap.geometry import axis_vector
+from reachmap.geometry import axis_turns, axis_vector
 
 
 class Kinematics:
@@ -162,8 +162,68 @@ class Kinematics:
             Pose of each; ``np.bincount(frame_index, minlength=n)`` counts them.
         """
         T = np.ascontiguousarray(T, float).reshape(-1, 4, 4)
+        return self._within_limits(self._solver.branches(T), windings, near)
+
+    def solve_rolls(
+        self,
+        T: FloatArray,
+        axis: str,
+        rolls_rad: FloatArray,
+        *,
+        near: FloatArray | None = None,
+    ) -> tuple[FloatArray, IntArray]:
+        """One winding of all solutions for poses at several rolls.
+
+        Where the last joint turns about the axis of the rolls, as on most tools with a
+        round cup, a pose is solved once and its solutions are turned.
+
+        Parameters
+        ----------
+        T : array, shape (n, 4, 4)
+            Poses T_base_tcp.
+        axis : str
+            TCP axis that the poses are turned about.
+        rolls_rad : array, shape (m,)
+        near : array, shape (dof,), optional
+            See `solve_many`.
+
+        Returns
+        -------
+        Q : array, shape (k, dof)
+            Solutions, poses in order, each at one roll after the other [rad].
+        index : array of int, shape (k,)
+            Of each: pose · m + roll.
+        """
+        rolls = len(rolls_rad)
+        sense = self.sense_of_last_joint(axis)
+        if not (self.complete and sense):
+            rolled = T[:, None] @ axis_turns(axis, rolls_rad)
+            return self.solve_many(rolled, windings=False, near=near)
+        Q, pose = self._solver.branches(np.ascontiguousarray(T, float))
+        turned = np.repeat(Q[:, None], rolls, axis=1)
+        turned[:, :, -1] += sense * rolls_rad
+        index = (pose[:, None] * rolls + np.arange(rolls)).ravel()
+        order = np.argsort(index, kind="stable")
+        rows = turned.reshape(-1, Q.shape[1])[order], index[order]
+        return self._within_limits(rows, False, near)
+
+    def sense_of_last_joint(self, axis: str) -> int:
+        """Sense in which the last joint turns the TCP about an axis; 0 if it does not.
+
+        To a hundredth of what a solution may miss its pose by.
+        """
+        T_joint_tcp = self.chain.T_fixed[-1]
+        joint_axis, p_joint_tcp = T_joint_tcp[2, :3], T_joint_tcp[:3, 3]
+        sign = round(float(joint_axis @ axis_vector(axis)))
+        tilted = np.abs(joint_axis - sign * axis_vector(axis)).max()
+        is_aside = max(tilted, *np.abs(p_joint_tcp[:2])) > self.tolerance / 100
+        return 0 if is_aside or not self.chain.is_revolute[-1] else sign
+
+    def _within_limits(
+        self, rows: Rows, windings: bool, near: FloatArray | None
+    ) -> Rows:
         return within_limits(
-            self._solver.branches(T),
+            rows,
             self.robot.lower_rad,
             self.robot.upper_rad,
             self.robot.is_revolute,

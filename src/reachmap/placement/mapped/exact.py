@@ -22,7 +22,7 @@ from reachmap.core.planning.connection import Connection, connect
 from reachmap.core.planning.roadmap import Goals
 from reachmap.core.scene import Scene
 from reachmap.geometry import axis_vector, inverse_transform, yaw_transform
-from reachmap.placement.mapped.sample import Sample, rolls_of
+from reachmap.placement.mapped.sample import Sample, rolled, rolls_of
 from reachmap.sampling.frames import approach_distance_m
 
 if TYPE_CHECKING:
@@ -147,9 +147,7 @@ class PlacedScene:
         self.scene = placing.at(scene, changed)
         cell = changed.cell
         self.T = self.scene.T_base_bin @ sample.T_bin_tcp
-        rolls = rolls_of(cell)
-        self._rolled = (self.T[:, None] @ rolls).reshape(-1, 4, 4)
-        self._rolls = len(rolls)
+        self._rolled = rolled(cell, self.T).reshape(-1, 4, 4)
         self._sample = sample
         self._approach = StraightApproach(
             self.scene.kinematics,
@@ -167,15 +165,16 @@ class PlacedScene:
         Branches nearest to the cell's own scan configuration come first. Frames that
         the tool cannot take have no free branch, and none is looked for.
         """
-        scene = self.scene
-        Q, rolled = scene.kinematics.solve_many(
-            self._rolled, windings=False, near=scene.scan_configuration
+        scene, rolls = self.scene, rolls_of(self.scene.loaded.cell)
+        axis = scene.loaded.cell.robot.tcp.approach_axis
+        Q, row = scene.kinematics.solve_rolls(
+            self.T, axis, rolls, near=scene.scan_configuration
         )
-        frame = rolled // self._rolls
+        frame = row // len(rolls)
         self._has_ik = np.bincount(frame, minlength=len(self.T)) > 0
         away = np.round(np.linalg.norm(Q - scene.scan_configuration, axis=1), 9)
         order = np.lexsort((away, frame))
-        self._Q, self._frame, self._row = Q[order], frame[order], rolled[order]
+        self._Q, self._frame, self._row = Q[order], frame[order], row[order]
         bounds = np.searchsorted(self._frame, np.arange(len(self.T) + 1))
         self._end = bounds[1:]
         can = self._sample.weight > 0

@@ -14,13 +14,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from reachmap._typing import BoolArray, FloatArray, IntArray
 from reachmap.cell.model.cell import Cell
 from reachmap.cell.model.robot import LISTED
 from reachmap.core.collision.bin_fit import ToolFit
-from reachmap.geometry import AXES, transform_from_parts
+from reachmap.geometry import axis_turns
 from reachmap.sampling.frames import FrameGrid, bin_test_frames
 from reachmap.scans.rolls import RollGroups
 
@@ -113,16 +112,18 @@ def frames_in_bin(cell: Cell) -> FrameGrid:
 
 
 def rolls_of(cell: Cell) -> FloatArray:
-    """Equivalent rolls about the approach axis, as T_tcp_rolled, shape (n, 4, 4).
+    """Equivalent rolls about the approach axis, shape (n,) [rad].
 
-    The identity where rolls are as listed; of many that are free, a few.
+    0 alone where rolls are as listed; of many that are free, a few.
     """
-    axis, sign = AXES[cell.robot.tcp.approach_axis]
-    turns = 2.0 * np.pi * np.arange(min(cell.tool.count(), MOST_ROLLS))
-    about = np.zeros((len(turns), 3))
-    about[:, axis] = sign * turns / len(turns)
-    R = Rotation.from_rotvec(about).as_matrix()
-    return transform_from_parts(R, np.zeros(3))
+    count = min(cell.tool.count(), MOST_ROLLS)
+    return 2.0 * np.pi * np.arange(count) / count
+
+
+def rolled(cell: Cell, T: FloatArray) -> FloatArray:
+    """Poses T_base_tcp at all equivalent rolls, (n, 4, 4) to (n, rolls, 4, 4)."""
+    turns = axis_turns(cell.robot.tcp.approach_axis, rolls_of(cell))
+    return np.asarray(T[..., None, :, :] @ turns)
 
 
 def kept_layers(count: int) -> list[int]:
@@ -137,8 +138,7 @@ def open_frames(robot: RobotModel, loaded: LoadedCell) -> BoolArray:
     fill the bin are in the way of the tool as its walls are.
     """
     frames, cell = frames_in_bin(loaded.cell), loaded.cell
-    rolls = rolls_of(cell)
-    T = frames.transforms()[..., None, :, :] @ rolls
+    T = rolled(cell, frames.transforms())
     layers = kept_layers(len(cell.bin_scan.layers))
     if not cell.bin_scan.is_filled:
         blocked = ToolFit(robot, loaded).blocked(T.reshape(-1, 4, 4))
@@ -149,7 +149,7 @@ def open_frames(robot: RobotModel, loaded: LoadedCell) -> BoolArray:
                 for layer, rows in zip(layers, T, strict=True)
             ]
         )
-    return np.asarray(~blocked.reshape(*frames.shape, len(rolls)).all(axis=-1))
+    return np.asarray(~blocked.reshape(T.shape[:-2]).all(axis=-1))
 
 
 def sample_of(cell: Cell, grid: Grid, is_open: BoolArray) -> Sample:
