@@ -114,14 +114,16 @@ def compare(cell: str, overrides: Sequence[str], count: int, folder: Path) -> No
     name = read_cell(cell, overrides).cell.name
     where = f"{x:+.3f} {y:+.3f} {z:+.3f} {np.degrees(yaw):.0f}°"
     stands = placement.support or "floats"
+    limit = 100.0 * float(problem.is_open.mean())
     gain = np.array(others) - own
     worse, better = (gain <= -SAME_POINTS).sum(), (gain >= SAME_POINTS).sum()
     print(
-        f"{name}: {where} on {stands}; worst case {own:.1f} %, told "
-        f"{placement.worst_score[placement.chosen]:.1f} ± "
+        f"{name}: {where} on {stands}; no pose can have more than {limit:.2f} % for "
+        f"the tool; worst case {own:.2f} %, told "
+        f"{placement.worst_score[placement.chosen]:.2f} ± "
         f"{placement.score_error[placement.chosen]:.1f} %, paper's rule "
-        f"{of_paper:.1f} %; of {len(others)} random poses {worse} are worse, {better} "
-        f"better (best {max(others, default=np.nan):.1f} %), supports "
+        f"{of_paper:.2f} %; of {len(others)} random poses {worse} are worse, {better} "
+        f"better (best {max(others, default=np.nan):.2f} %), supports "
         f"{len(problem.supports)}, {evaluator.cpu_s:.0f} s",
         flush=True,
     )

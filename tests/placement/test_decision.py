@@ -22,7 +22,7 @@ from reachmap.placement.predicted.places import apart_m
 from reachmap.placement.predicted.region import Region
 from reachmap.placement.problem import PlacementProblem
 from reachmap.placement.search import decide_by_search
-from reachmap.placement.steadying import worst_of
+from reachmap.placement.steadying import stated_worst, steadied, worst_of
 from reachmap.placement.tolerance import Tolerance
 from tests.support.closed_form_evaluator import ClosedForm
 from tests.support.optional import present
@@ -226,6 +226,23 @@ def test_the_bin_keeps_out_of_the_drop_off(caplog):
     tolerance = Tolerance(shift_m=0.03, turn_rad=0.05)
     asked = dataclasses.replace(asked, tolerance=tolerance)
     assert worst_of(asked, given.table.rows[0]).score == 0.0
+
+
+def test_the_pose_is_nudged_from_what_a_neighbour_loses():
+    """A plateau ends 25 mm off along a diagonal, for a bin turned one way alone."""
+    tolerance = Tolerance(shift_m=0.03, turn_rad=0.05)
+
+    def plateau(pose):
+        # What the quick look at few directions does not see.
+        return 90.0 - (pose[0] + pose[1] > 1.035 and pose[3] > 0.01)
+
+    asked = dataclasses.replace(problem(plateau), tolerance=tolerance)
+    (edge,) = asked.exact([(0.6, 0.4, 0.0, 0.0)])
+    assert stated_worst(asked, edge) == 89.0
+    (best, *_) = steadied(asked, [edge])
+    assert best.worst == 90.0
+    assert np.hypot(best.pose[0] - 0.6, best.pose[1] - 0.4) < 0.05
+    assert best.pose[2:] == (0.0, 0.0)
 
 
 def test_a_bin_may_not_get_into_the_drop_off_when_it_is_off():

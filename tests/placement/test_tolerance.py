@@ -63,6 +63,18 @@ def test_offsets_stay_within_the_tolerance_and_on_its_edge():
     assert Tolerance(shift_m=0.0, turn_rad=0.0).is_none
 
 
+def test_all_directions_are_looked_at_with_either_turn():
+    """Offsets and the others are the eight directions, each with both turns."""
+    every = np.vstack([TOLERANCE.offsets(), TOLERANCE.others()]) / SCALE
+    angle_deg = np.degrees(np.arctan2(every[:, 1], every[:, 0])).round(6) % 360
+    seen = sorted(zip(angle_deg.tolist(), every[:, 3].round(9).tolist(), strict=True))
+    assert seen == [(a, t) for a in np.arange(0.0, 360.0, 45.0) for t in (-1.0, 1.0)]
+    assert np.linalg.norm(every[:, :3], axis=1) == pytest.approx(1.0)
+    turned = Tolerance(shift_m=0.0, turn_rad=0.1)
+    assert len(turned.others()) == 0
+    assert turned.offsets()[:, 3].tolist() == [0.1, -0.1]
+
+
 def test_a_plane_falls_by_its_slope():
     """A linear score loses slope times shift in one direction, nothing in the other."""
     slope = 200.0
@@ -111,12 +123,12 @@ def test_what_few_grasps_hide_is_confirmed_with_more():
         found = Candidate(pose=pose, score=here.score, exact=True)
         quick = worst_case(found, tolerance, q, lambda pose: True, evaluator)
         confirmed = confirmed_worst(found, quick, tolerance, q, evaluator)
-        offsets = np.vstack([tolerance.offsets(), tolerance.mirrored()])
+        offsets = np.vstack([tolerance.offsets(), tolerance.others()])
         neighbours = [moved_by(pose, offset) for offset in offsets]
         every = evaluator.evaluate(neighbours, q, grid=EVERY_GRASP)
     true = min(present(evaluation.score).score for evaluation in every)
     assert quick.score == present(here.score).score
-    assert confirmed == pytest.approx(true)
+    assert confirmed.score == pytest.approx(true)
     assert true < quick.score - NOISE_POINTS
 
 
@@ -131,7 +143,24 @@ def test_a_loss_that_only_another_turn_shows_counts():
     quick = worst_case(found, TOLERANCE, None, lambda pose: True, evaluator)
     assert quick.score == 90.0
     confirmed = confirmed_worst(found, quick, TOLERANCE, None, evaluator)
-    assert confirmed == pytest.approx(82.0)
+    assert confirmed.score == pytest.approx(82.0)
+
+
+def test_a_loss_between_the_axes_counts():
+    """A score that falls in one diagonal direction alone, with one turn alone."""
+
+    def score(pose):
+        x, y, _, yaw = (np.array(pose) - POSE) / SCALE
+        return 90.0 - 5.0 * (min(-x, y) > 0.5 and yaw > 0.5)
+
+    evaluator, found = ClosedForm(score), candidate(POSE, score)
+    quick = worst_case(found, TOLERANCE, None, lambda pose: True, evaluator)
+    assert quick.score == 90.0
+    confirmed = confirmed_worst(found, quick, TOLERANCE, None, evaluator)
+    assert confirmed.score == 85.0
+    assert (confirmed.lost > 0).sum() == 1
+    away = present(away_from_losses(POSE, TOLERANCE, confirmed, 0.0, 0.5))
+    assert np.subtract(away, POSE) == pytest.approx([0.015, -0.015, 0.0, 0.0])
 
 
 def test_the_worst_case_bounds_poses_inside_a_cone():

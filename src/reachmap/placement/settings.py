@@ -39,6 +39,7 @@ def placement_settings() -> dict[str, Any]:
             "tried": steadying.TRIED,
             "below_points": steadying.BELOW_POINTS,
             "moves": steadying.MOVES,
+            "nudge": [steadying.NUDGE_POINTS, steadying.NUDGES],
             "noise_points": tolerance.NOISE_POINTS,
             "least_error": steadying.LEAST_ERROR,
             "room": tolerance.ROOM,

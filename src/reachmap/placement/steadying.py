@@ -13,6 +13,7 @@ from reachmap.placement.predicted.places import rank_key
 from reachmap.placement.problem import PlacementProblem
 from reachmap.placement.tolerance import (
     NOISE_POINTS,
+    ROOM,
     WorstCase,
     away_from_losses,
     confirmed_worst,
@@ -23,6 +24,9 @@ from reachmap.placement.tolerance import (
 # Poses whose neighbours are looked at, how far below the best they may score, and
 # how often each of them is moved away from what its neighbours lose.
 TRIED, BELOW_POINTS, MOVES = 2, 3.0, 1
+# A confirmed loss from which on a pose is nudged, by what its tolerance leaves of the
+# room it is moved by; about the least that the thin sample of the shipped cell can see.
+NUDGE_POINTS, NUDGES, NUDGE = 0.25, 2, ROOM - 1.0
 # What a margin may cost, as everywhere; equal within this are worst cases at least.
 MARGIN_POINTS, LEAST_ERROR = 5.0, 0.1
 
@@ -67,9 +71,13 @@ def steadied(problem: PlacementProblem, mapped: list[Candidate]) -> list[Candida
 
 def stated_worst(problem: PlacementProblem, candidate: Candidate) -> float:
     """Worst case of a pose under the tolerance asked for, confirmed [percent]."""
+    return _confirmed_worst(problem, candidate).score
+
+
+def _confirmed_worst(problem: PlacementProblem, candidate: Candidate) -> WorstCase:
     worst = worst_of(problem, candidate)
     if worst.score == 0.0:
-        return 0.0
+        return worst
     return confirmed_worst(
         candidate, worst, problem.tolerance, problem.start, problem.evaluator
     )
@@ -94,13 +102,19 @@ def _looked_at(
 
 
 def _moved(
-    problem: PlacementProblem, candidate: Candidate, worst: WorstCase, *, above: float
+    problem: PlacementProblem,
+    candidate: Candidate,
+    worst: WorstCase,
+    *,
+    above: float,
+    slack: float = NOISE_POINTS,
+    by: float = ROOM,
 ) -> Candidate | None:
     """A candidate further from its losses, mapped exactly.
 
     None where it cannot be, or where it cannot score above a worst case.
     """
-    pose = away_from_losses(candidate.pose, problem.tolerance, worst, NOISE_POINTS)
+    pose = away_from_losses(candidate.pose, problem.tolerance, worst, slack, by)
     if pose is None or problem.reason_against(pose):
         return None
     if not problem.can_be_imaged(pose):
@@ -126,8 +140,8 @@ def _confirmed(problem: PlacementProblem, rivals: list[Candidate]) -> list[Candi
     """
     confirmed: list[Candidate] = []
     for k, candidate in enumerate(rivals):
-        worst = stated_worst(problem, candidate)
-        confirmed.append(dataclasses.replace(candidate, worst=worst))
+        best = max((c.worst or 0.0 for c in confirmed), default=0.0)
+        confirmed.append(_nudged(problem, candidate, best))
         best = max(c.worst or 0.0 for c in confirmed)
         if all((c.worst or 0.0) <= best + _error(candidate) for c in rivals[k + 1 :]):
             break
@@ -135,6 +149,29 @@ def _confirmed(problem: PlacementProblem, rivals: list[Candidate]) -> list[Candi
     first = next(c for c in confirmed if (c.worst or 0.0) >= best - _error(c))
     others = [c for c in confirmed if c is not first]
     return [first, *others, *rivals[len(confirmed) :]]
+
+
+def _nudged(problem: PlacementProblem, candidate: Candidate, least: float) -> Candidate:
+    """A candidate with its worst case confirmed, or a better one close to it.
+
+    It is nudged away from what its neighbours lose, unless it is not the best anyhow.
+    """
+    worst = _confirmed_worst(problem, candidate)
+    here = best = dataclasses.replace(candidate, worst=worst.score)
+    for _ in range(NUDGES):
+        if worst.score < max(least, best.worst or 0.0, LEAST_ERROR):
+            break
+        if worst.lost.max() < NUDGE_POINTS:
+            break
+        moved = _moved(
+            problem, here, worst, above=worst.score, slack=NUDGE_POINTS, by=NUDGE
+        )
+        if moved is None:
+            break
+        worst = _confirmed_worst(problem, moved)
+        here = dataclasses.replace(moved, worst=worst.score)
+        best = max(best, here, key=lambda c: c.worst or 0.0)
+    return best
 
 
 def _error(candidate: Candidate) -> float:

@@ -56,9 +56,21 @@ class Tolerance:
         """What is allowed of x, y, z [m] and yaw [rad], shape (4,)."""
         return np.array([*[self.shift_m] * 3, self.turn_rad])
 
-    def mirrored(self) -> FloatArray:
-        """The offsets with the other turn, shape (n, 4)."""
-        return np.asarray(self.offsets() * np.array([1.0, 1.0, 1.0, -1.0]))
+    def others(self) -> FloatArray:
+        """Poses on the edge that :meth:`offsets` leaves out, less the pose, (n, 4).
+
+        The directions of the plane with the other turn, and those between them with
+        either.
+        """
+        straight = self.offsets()
+        straight = straight[straight[:, 2] == 0.0] * (1.0, 1.0, 1.0, -1.0)
+        if not self.shift_m:
+            return np.asarray(straight[:0])
+        turns = np.array([1.0, -1.0])
+        angle, turn = np.meshgrid(np.radians([45, 135, 225, 315]), turns, indexing="ij")
+        unit = [np.cos(angle), np.sin(angle), np.zeros(angle.shape), turn]
+        between = np.stack(unit, axis=-1).reshape(-1, 4) * self.scale
+        return np.vstack([straight, between])
 
     def steps(self) -> FloatArray:
         """One step along each axis either way, with some room, shape (n, 4)."""
@@ -78,11 +90,14 @@ class WorstCase:
     ----------
     score : float
         [percent].
+    offsets : array, shape (n, 4)
+        What was looked at, less the pose itself.
     lost : array, shape (n,)
-        What each of the tolerance's offsets costs against the pose itself [points].
+        What each of the offsets costs against the pose itself [points].
     """
 
     score: float
+    offsets: FloatArray
     lost: FloatArray
 
 
@@ -110,16 +125,13 @@ def worst_case(
     evaluator : Evaluator
     """
     assert candidate.score is not None
-    own = candidate.score.score
-    poses = [moved_by(candidate.pose, offset) for offset in tolerance.offsets()]
+    own, offsets = candidate.score.score, tolerance.offsets()
     # Whether the bin fits somewhere is cheap to check, so more poses are checked.
-    possible = [
-        is_possible(pose) and is_possible(moved_by(candidate.pose, other))
-        for pose, other in zip(poses, tolerance.mirrored(), strict=True)
-    ]
+    every = np.vstack([offsets, tolerance.others()])
+    possible = [is_possible(moved_by(candidate.pose, offset)) for offset in every]
     if not all(possible):
-        lost = np.where(possible, 0.0, own)
-        return WorstCase(score=0.0, lost=lost)
+        return WorstCase(score=0.0, offsets=every, lost=np.where(possible, 0.0, own))
+    poses = [moved_by(candidate.pose, offset) for offset in offsets]
     evaluator.expect(1 + len(poses))
     (here,) = evaluator.evaluate([candidate.pose], q, grid=QUICK)
     least = here.score.score if here.score is not None else own
@@ -129,7 +141,8 @@ def worst_case(
     )
     # No more was looked for where the rest is the sample's noise.
     lost[lost <= NOISE_POINTS] = 0.0
-    return WorstCase(score=max(own - float(lost.max()), 0.0), lost=lost)
+    score = max(own - float(lost.max()), 0.0)
+    return WorstCase(score=score, offsets=offsets, lost=lost)
 
 
 def confirmed_worst(
@@ -138,12 +151,12 @@ def confirmed_worst(
     tolerance: Tolerance,
     q: FloatArray | None,
     evaluator: Evaluator,
-) -> float:
-    """Least score of a pose and of its neighbours, from more test grasps [percent].
+) -> WorstCase:
+    """Least score of a pose and of its neighbours, from more test grasps.
 
-    Few grasps hide points that a neighbour loses. The shifts in the plane are looked at
-    with the other turn and more grasps; where they, or those before, lose more than a
-    sample's noise, the worst of them has every orientation.
+    Few grasps hide points that a neighbour loses. The directions that were left out are
+    looked at with more grasps; where they, or those before, lose more than a sample's
+    noise, the worst of them has every orientation.
 
     Parameters
     ----------
@@ -157,24 +170,26 @@ def confirmed_worst(
     evaluator : Evaluator
     """
     assert candidate.score is not None
-    own, mirrored = candidate.score.score, tolerance.mirrored()
-    in_plane = mirrored[mirrored[:, 2] == 0.0]
-    offsets = np.vstack([tolerance.offsets(), in_plane])
-    poses = [moved_by(candidate.pose, offset) for offset in offsets]
-    others = poses[-len(in_plane) :]
-    evaluator.expect(len(others) + 3)
+    own, others = candidate.score.score, tolerance.others()
+    poses = [moved_by(candidate.pose, offset) for offset in others]
+    evaluator.expect(len(poses) + 3)
     here = _score(evaluator.evaluate([candidate.pose], q, grid=THIN)[0])
-    found = evaluator.evaluate(others, q, enough=here, grid=THIN)
+    found = evaluator.evaluate(poses, q, enough=here, grid=THIN)
     lost = np.array([max(here - _score(evaluation), 0.0) for evaluation in found])
-    suspects = [
-        pose[int(loss.argmax())]
-        for pose, loss in ((poses, worst.lost), (others, lost))
-        if loss.max() > NOISE_POINTS
-    ]
-    if not suspects:
-        return own - float(lost.max())
-    dense = evaluator.evaluate(suspects, q, enough=own, grid=DENSE)
-    return min(own, *map(_score, dense))
+    parts = [(worst.offsets, worst.lost.copy()), (others, lost)]
+    for offsets, losses in parts:
+        if losses.max(initial=0.0) > NOISE_POINTS:
+            suspect = int(losses.argmax())
+            pose = moved_by(candidate.pose, offsets[suspect])
+            (dense,) = evaluator.evaluate([pose], q, enough=own, grid=DENSE)
+            # The sample is taken to be off by as much in the other directions.
+            losses *= max(own - _score(dense), 0.0) / losses[suspect]
+    lost = np.concatenate([losses for _, losses in parts])
+    return WorstCase(
+        score=own - float(lost.max()),
+        offsets=np.vstack([offsets for offsets, _ in parts]),
+        lost=lost,
+    )
 
 
 def _score(evaluation: Evaluation) -> float:
@@ -182,7 +197,7 @@ def _score(evaluation: Evaluation) -> float:
 
 
 def away_from_losses(
-    pose: Pose, tolerance: Tolerance, worst: WorstCase, slack: float
+    pose: Pose, tolerance: Tolerance, worst: WorstCase, slack: float, by: float = ROOM
 ) -> Pose | None:
     """A pose further from where the score is lost; None where nothing is.
 
@@ -193,9 +208,10 @@ def away_from_losses(
     worst : WorstCase
     slack : float
         A loss that does not matter [points].
+    by : float
+        How far, in tolerances.
     """
-    offsets = tolerance.offsets()
-    bad = worst.lost > slack
+    offsets, bad = worst.offsets, worst.lost > slack
     if not bad.any() or bad.all():
         return None
     push = -(worst.lost[bad][:, None] * offsets[bad]).sum(axis=0)
@@ -207,8 +223,8 @@ def away_from_losses(
     largest = float(np.abs(relative).max())
     if largest < 1e-9:
         return None
-    step = ROOM * scale * np.where(np.abs(relative) > largest / 2, np.sign(relative), 0)
-    return moved_by(pose, step)
+    step = np.where(np.abs(relative) > largest / 2, np.sign(relative), 0.0)
+    return moved_by(pose, by * scale * step)
 
 
 def moved_by(pose: Pose, offset: FloatArray | Sequence[float]) -> Pose:
