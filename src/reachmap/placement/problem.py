@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,7 +23,7 @@ from reachmap.maps.records import WorkspaceMap
 from reachmap.placement.drop_off_room import DropOffRoom
 from reachmap.placement.mapped.candidates import Candidate, mapped_candidates
 from reachmap.placement.mapped.evaluator import Evaluator
-from reachmap.placement.mapped.exact import ALWAYS, Pose, bin_at
+from reachmap.placement.mapped.exact import ALWAYS, Pose
 from reachmap.placement.mapped.imaging import (
     OUT_OF_SIGHT,
     imaging_configurations,
@@ -43,7 +44,7 @@ if TYPE_CHECKING:
     from reachmap.cell.loading import LoadedCell
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class PlacementProblem:
     """A cell, its workspace map, and where the bin may stand.
 
@@ -99,7 +100,11 @@ class PlacementProblem:
 
     def T_base_bin(self, pose: Pose) -> FloatArray:  # noqa: N802
         """The bin at a pose, in robot_base, shape (4, 4)."""
-        return bin_at(self.loaded.cell, pose)
+        return np.asarray(self._T_base_level @ yaw_transform(*pose))
+
+    @cached_property
+    def _T_base_level(self) -> FloatArray:  # noqa: N802
+        return self.loaded.cell.T_base_level()
 
     def reason_against(self, pose: Pose, *, floats: bool = False) -> str:
         """Why the bin cannot stand at a pose, or ""; it may float if that is said."""

@@ -189,8 +189,8 @@ class ToolFit:
         parts = parts_of_bin(loaded)
         self._walls = PlacedBodies(
             (
-                PlacedBody(name=name, joint=ROOT, shape=shape, T=_at(centre))
-                for name, shape, centre in (
+                PlacedBody(name=name, joint=ROOT, shape=shape, T=T_bin_part)
+                for name, shape, T_bin_part in (
                     _part(part, 0.0) for part in ([_around(parts)] if whole else parts)
                 )
             ),
@@ -258,7 +258,7 @@ class _Group:
         self, placed: PlacedBodies, parts: list[Part], allowed: _Touches
     ) -> None:
         self._placed, self._parts, self._allowed = placed, parts, allowed
-        boxes = [box_around(shape, _at(centre)) for _, shape, centre in parts]
+        boxes = [box_around(shape, T_bin_part) for _, shape, T_bin_part in parts]
         self._low = np.min([low for low, _ in boxes], axis=0)
         self._high = np.max([high for _, high in boxes], axis=0)
 
@@ -268,19 +268,22 @@ class _Group:
         centre = R @ ((self._low + self._high) / 2) + T_base_bin[:3, 3]
         half = np.abs(R) @ ((self._high - self._low) / 2)
         near = self._placed.near(centre - half, centre + half)
-        for name, shape, offset in self._parts:
+        if not len(near):
+            return None
+        for name, shape, T_bin_part in self._parts:
             among = [
                 k for k in near if not self._allowed(name, self._placed.bodies[k].name)
             ]
-            hit = self._placed.touching(shape, T_base_bin @ _at(offset), among)
+            hit = self._placed.touching(shape, T_base_bin @ T_bin_part, among)
             if hit >= 0:
                 return name, self._placed.bodies[hit]
         return None
 
 
 def _part(part: BinPart, shrink_m: float) -> Part:
-    """Name, shape and place of a part, smaller by this much along each axis."""
-    return part.name, coal_shape(shrunk(part.shape, shrink_m)), part.centre_m
+    """Name, shape and pose of a part, smaller by this much along each axis."""
+    T_bin_part = transform_from_parts(np.eye(3), part.centre_m)
+    return part.name, coal_shape(shrunk(part.shape, shrink_m)), T_bin_part
 
 
 def _around(parts: Sequence[BinPart]) -> BinPart:
@@ -289,10 +292,6 @@ def _around(parts: Sequence[BinPart]) -> BinPart:
     low, high = points.min(axis=0), points.max(axis=0)
     x, y, z = (high - low).tolist()
     return BinPart(name=WHOLE, shape=Shape(box=(x, y, z)), centre_m=(low + high) / 2.0)
-
-
-def _at(p: FloatArray) -> FloatArray:
-    return transform_from_parts(np.eye(3), p)
 
 
 def _tcp_pose(robot: RobotModel, q: FloatArray) -> FloatArray:
