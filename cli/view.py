@@ -9,6 +9,7 @@ import click
 from reachmap.cli import options
 from reachmap.cli.terminal import print_answer
 
+# As ViewOptions has them, whose module takes long to load.
 HOST, PORT = "127.0.0.1", 8080
 
 

@@ -35,6 +35,7 @@ from reachmap.plots.parts.style import (
     subtitle_of,
 )
 
+# Lengths on paper [in]: choices of layout.
 LEFT, RIGHT, TOP, BOTTOM = 0.80, 0.95, 1.05, 0.60
 WIDEST, TALLEST = 6.0, 6.0
 

@@ -315,6 +315,7 @@ def _draw_means(axes: Axes, maps: MapChange) -> None:
         spine.set_edgecolor(RULE)
 
 
+# Choices of layout: lengths on paper [in].
 MULTIPLES_PER_ROW, MULTIPLE_IN, MULTIPLE_GAP = 4, 2.4, 0.55
 
 

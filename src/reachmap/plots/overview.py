@@ -26,6 +26,7 @@ from reachmap.plots.parts.style import (
     subtitle_of,
 )
 
+# Lengths on paper [in]: choices of layout.
 LEFT, RIGHT, TOP, BOTTOM = 0.75, 0.75, 0.48, 0.85
 GAP_X, GAP_Y = 0.25, 0.44
 WIDEST, TALLEST = 3.2, 3.6

@@ -35,6 +35,7 @@ from reachmap.ranking.lookup.ranker import Ranker
 
 logger = logging.getLogger(__name__)
 
+# Choices: heaps stay below the rim, and three show how much they differ.
 FILL, HEAPS, MAX_HEAPS = 0.9, 3, 1000
 # A choice that bounds the memory of a heap.
 MAX_PARTS = 20_000

@@ -58,6 +58,7 @@ def legend_name(record: Artefact | None) -> str:
     return "score"
 
 
+# Choices by eye: long enough to look, short enough not to wait.
 PAUSE_S, LEVEL_S = 0.7, 1.6
 
 

@@ -31,6 +31,7 @@ _NEAR_NOMINAL = 0.2
 # Axes are parallel to EAIK within 1e-13.
 _PARALLEL = 1e-12
 
+# EAIK knows arms of up to this many axes.
 _AXES = 6
 
 # Random configurations that a closed form must find again before it is used, but for

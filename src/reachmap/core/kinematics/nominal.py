@@ -28,6 +28,7 @@ _CALIBRATION_M = 0.005
 _ROUNDED_ANGLE = 2.5e-5
 _PLAIN = np.array([0.0, 0.5, np.sqrt(0.5), np.sqrt(0.75), 1.0])
 
+# Fewer cannot correct what rounded angles put beside a pose.
 _AXES = 6
 
 # An arm that is further from its nominal one [m and rad] is not merely rounded.

@@ -21,6 +21,7 @@ from reachmap.maps.bytes.tree import Array, Leaf, Tree
 CHUNK_BYTES = 16 * 2**20
 # A choice against hostile input: workspace maps have fewer than a hundred.
 MAX_OBJECTS = 10_000
+# A choice: more does not fit into the memory of most machines.
 MAX_BYTES = 16 * 2**30
 """Largest artefact that is read into memory [bytes, uncompressed]."""
 

@@ -52,6 +52,7 @@ MAX_PROBLEMS = 8
 
 _PREFIX = b"\nreachmap-seal sha256 "
 _PATTERN = re.compile(re.escape(_PREFIX) + rb"([0-9a-f]{64})\n\Z")
+# The hash as 64 hexadecimal digits, and a line feed.
 SEAL_BYTES = len(_PREFIX) + 65
 
 Record = TypeVar("Record")

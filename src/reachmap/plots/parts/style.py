@@ -34,6 +34,7 @@ INK, MUTED, RULE = "#1c1c1c", "#5f5f5f", "#9a9a9a"
 PALE = "#dcdcdc"
 BIN_COLOUR = "#10389c"
 
+# Choices: sizes of type [pt], readable on paper and on a screen.
 TITLE_SIZE, SUBTITLE_SIZE, LABEL_SIZE, TICK_SIZE = 12.5, 9.5, 9.5, 8.5
 SMALLEST_NUMBER, LARGEST_NUMBER = 4.8, 10.0
 # A choice: sharp on paper, in files of a moderate size.
