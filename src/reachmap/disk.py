@@ -11,6 +11,8 @@ import os
 import stat
 from pathlib import Path
 
+HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
+
 
 def is_there(path: Path) -> bool:
     """Whether anything of that name exists and is accessible."""
@@ -25,6 +27,17 @@ def is_file(path: Path) -> bool:
 def is_folder(path: Path) -> bool:
     """Whether an accessible folder of that name exists."""
     return os.path.isdir(path)  # noqa: PTH112
+
+
+def is_hdf5(path: Path) -> bool:
+    """Whether a regular file begins as HDF5 does; one that cannot be read does not."""
+    try:
+        if not is_file(path):
+            return False
+        with path.open("rb") as stream:
+            return stream.read(len(HDF5_SIGNATURE)) == HDF5_SIGNATURE
+    except (OSError, ValueError):
+        return False
 
 
 def real_path(path: Path | str) -> Path:

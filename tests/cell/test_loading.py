@@ -137,6 +137,16 @@ def test_an_unknown_name_says_which_cells_there_are() -> None:
         read_cell("none.yaml")
 
 
+def test_a_map_is_no_cell(tmp_path: Path) -> None:
+    """However large it is; what is said names the way to its cell."""
+    for size in (10, 400_000):
+        path = tmp_path / "map.h5"
+        path.write_bytes(b"\x89HDF\r\n\x1a\n" + b"\0" * size)
+        with pytest.raises(CellError, match="an HDF5 file, a map perhaps") as told:
+            read_cell(path)
+        assert "cells --export" in told.value.lines[0]
+
+
 def test_four_mistakes_are_four_lines(tmp_path: Path) -> None:
     """Each has file, line and column, the value found and what was expected."""
     text = CELL.replace("xyz: [1, 0, 0]", "xyz: [1, 0, abc]")

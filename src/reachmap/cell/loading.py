@@ -32,7 +32,7 @@ from reachmap.cell.text.yaml_reader import (
     parse_yaml,
     read_text,
 )
-from reachmap.disk import is_file, is_text, recorded_name
+from reachmap.disk import is_file, is_hdf5, is_text, recorded_name
 from reachmap.errors import CellError
 
 __all__ = [
@@ -79,6 +79,11 @@ def read_cell(name_or_path: str | Path, overrides: Sequence[str] = ()) -> Loaded
     name_or_path = str(name_or_path)
     path = cell_path(str(name_or_path))
     check_storable(path)
+    if is_hdf5(path):
+        raise CellError(
+            f"{path}: this is an HDF5 file, a map perhaps; not a cell (`reachmap cells "
+            "--export` writes the cell of a map)"
+        )
     text = read_text(path, limit=MAX_TEXT_BYTES)
     return cell_from_text(
         text,

@@ -33,8 +33,6 @@ from reachmap.maps.bytes.hdf5 import (
 
 Found = TypeVar("Found")
 
-SIGNATURE = b"\x89HDF\r\n\x1a\n"
-
 CPU_LIMIT_S = 2.0
 """Time that reading may take [s]; a map of 3 MB takes 0.1 s."""
 

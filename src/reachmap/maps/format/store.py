@@ -18,7 +18,7 @@ from typing import Generic, TypeVar
 
 import numpy as np
 
-from reachmap.disk import read_up_to
+from reachmap.disk import HDF5_SIGNATURE, read_up_to
 from reachmap.errors import EngineError, MapFileError, ReachmapError
 from reachmap.maps.bytes.hdf5 import (
     MAX_BYTES,
@@ -28,7 +28,6 @@ from reachmap.maps.bytes.hdf5 import (
     tree_from_image,
 )
 from reachmap.maps.bytes.isolation import (
-    SIGNATURE,
     is_open_for_writing,
     isolated,
     named_size,
@@ -241,7 +240,7 @@ def read_image(path: Path, layouts: Sequence[Layout] = ()) -> tuple[bytes, bool]
         Whether it has a seal, which then fits.
     """
     image, intact = unseal(read_bytes(path, layouts))
-    if not image.startswith(SIGNATURE):
+    if not image.startswith(HDF5_SIGNATURE):
         raise MapFileError(f"{path}: {_foreign(image)}; {_expected(layouts)}")
     if intact is False:
         raise _damaged(path, image, "its bytes do not match its seal", layouts)
