@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -69,6 +70,7 @@ def command(
 
     Example: reachmap bin-scan placement.h5 --set bin_scan.repeats=1
     """
+    from reachmap.cell.text.overrides import given_as
     from reachmap.tools.bin_scan import bin_scan, estimate_bin_scan, summary_of_bin
     from reachmap.tools.prologue import written_by
 
@@ -84,26 +86,21 @@ def command(
     workspace = None
     if placement is None and cell is None:
         placement, workspace = _found_here()
-    if dry_run:
-        facts = estimate_bin_scan(
-            placement,
-            cell=cell,
-            workspace=workspace,
-            overrides=overrides,
-            seed=seed,
-            run=run,
-        )
-    else:
-        result = bin_scan(
-            placement,
-            output,
-            cell=cell,
-            workspace=workspace,
-            overrides=overrides,
-            seed=seed,
-            run=run,
-        )
-        facts = {"output": str(written_by(output, run))} | summary_of_bin(result)
+    asked: dict[str, Any] = {
+        "cell": cell,
+        "workspace": workspace,
+        "overrides": overrides,
+        "seed": seed,
+        "run": run,
+    }
+    with given_as(
+        {f"pick_from={bin_name}": f"--bin {bin_name}", f"part={part}": f"--part {part}"}
+    ):
+        if dry_run:
+            facts = estimate_bin_scan(placement, **asked)
+        else:
+            result = bin_scan(placement, output, **asked)
+            facts = {"output": str(written_by(output, run))} | summary_of_bin(result)
     print_answer(facts, lambda: facts_text(facts), as_json=as_json)
 
 

@@ -158,6 +158,7 @@ def command(
     """
     if bin_pose is not None:
         unused("rule", "fixed", "region", "heights", because="not used with --bin-pose")
+    from reachmap.cell.text.overrides import given_as
     from reachmap.cli.text.placement import placement_lines
     from reachmap.tools.place_bin import PlacementChoice, place_bin, placement_facts
     from reachmap.tools.place_bins import bin_names, place_bins
@@ -179,9 +180,14 @@ def command(
         )
         _print_several(several, output, top, as_json=as_json)
         return
-    placement = place_bin(
-        workspace, output, choice=choice, overrides=with_bin(overrides, bin_name), **how
-    )
+    with given_as({f"pick_from={bin_name}": f"--bin {bin_name}"}):
+        placement = place_bin(
+            workspace,
+            output,
+            choice=choice,
+            overrides=with_bin(overrides, bin_name),
+            **how,
+        )
     print_answer(
         {"output": str(output)} | placement_facts(placement),
         lambda: "\n".join(placement_lines(placement, output, top)),

@@ -67,6 +67,13 @@ class Variant:
             for factor, text in zip(factors, self.overrides, strict=True)
         )
 
+    def options(self, factors: Sequence[Factor]) -> dict[str, str]:
+        """Each override to the option that it is a value of."""
+        return {
+            text: f"--vary {factor.name}={text.partition('=')[2]}"
+            for factor, text in zip(factors, self.overrides, strict=True)
+        }
+
     def row(self, factors: Sequence[Factor]) -> dict[str, Any]:
         """Its row in the study before it is computed."""
         return {

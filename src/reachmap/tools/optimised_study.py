@@ -8,6 +8,7 @@ from functools import partial
 from typing import Any
 
 from reachmap.cell.loading import read_cell
+from reachmap.cell.text.overrides import given_as
 from reachmap.errors import CellError
 from reachmap.runtime.job import Job, Stages, Work
 from reachmap.scans.document import journal_settings
@@ -41,7 +42,8 @@ class Search:
         """The variant with its cell, or why it has none."""
         row = variant.row(self.factors)
         try:
-            loaded = read_cell(self.cell, [*self.overrides, *variant.overrides])
+            with given_as(variant.options(self.factors)):
+                loaded = read_cell(self.cell, [*self.overrides, *variant.overrides])
         except CellError as error:
             return Proposal(row=row | {"cause": "; ".join(error.lines)}, loaded=None)
         return Proposal(row=row | {"cell_sha256": loaded.sha256}, loaded=loaded)

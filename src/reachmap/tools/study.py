@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from reachmap.cell.loading import LoadedCell, read_cell
+from reachmap.cell.text.overrides import given_as
 from reachmap.core.memo import fingerprint
 from reachmap.errors import CellError, GateFailedError, SettingsError
 from reachmap.maps import Stamp, collect_provenance, config_sha256
@@ -282,7 +283,8 @@ def _rows(
     for variant in variants:
         row = variant.row(factors)
         try:
-            loaded = read_cell(cell, [*overrides, *variant.overrides])
+            with given_as(variant.options(factors)):
+                loaded = read_cell(cell, [*overrides, *variant.overrides])
             cells.setdefault(loaded.sha256, loaded)
             row |= {
                 "unit": [*cells].index(loaded.sha256),

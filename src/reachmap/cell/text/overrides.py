@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 from pydantic import BaseModel
@@ -35,7 +36,7 @@ def apply_overrides(
     if len(overrides) > MAX_OVERRIDES:
         raise CellError(f"--set: at most {MAX_OVERRIDES} assignments")
     for text in overrides:
-        place = Place(source=f"{SOURCE}{recorded_name(text[:120])}")
+        place = _place(text)
         try:
             _apply(document, text, place, model)
         except _PathError as error:
@@ -45,6 +46,33 @@ def apply_overrides(
                 Mistake(place=place, message=line.removeprefix(f"{place}:").strip())
                 for line in error.lines
             )
+
+
+@contextmanager
+def given_as(options: Mapping[str, str]) -> Iterator[None]:
+    """Let mistakes name the options that assignments stand for.
+
+    Parameters
+    ----------
+    options : mapping
+        Assignment, as in ``pick_from=left``, to the option, as in ``--bin left``.
+    """
+    names = {f"{_place(text)}: ": f"{option}: " for text, option in options.items()}
+
+    def renamed(line: str) -> str:
+        for assignment, option in names.items():
+            if line.startswith(assignment):
+                return option + line.removeprefix(assignment)
+        return line
+
+    try:
+        yield
+    except CellError as error:
+        raise CellError([renamed(line) for line in error.lines]) from error
+
+
+def _place(text: str) -> Place:
+    return Place(source=f"{SOURCE}{recorded_name(text[:120])}")
 
 
 def is_override(place: Place) -> bool:
