@@ -5,7 +5,7 @@ from __future__ import annotations
 import textwrap
 
 from reachmap.cli.text.tables import WIDTH, table_lines
-from reachmap.maps.study.words import estimate_text
+from reachmap.maps.study.words import estimate_text, no_best_text
 from reachmap.maps.summary.study import (
     MainEffect,
     StudySummary,
@@ -46,7 +46,8 @@ def _best_lines(summary: StudySummary) -> list[str]:
             name, said = next(iter(variant.objectives)), variant.estimates()[0]
             lines.append(f"{word}: {variant.assignment}: {name} {said}")
     if summary.best < 0:
-        lines.append("best: none, no variant meets the requirements")
+        why = no_best_text(summary.done, summary.requirements)
+        lines.append(f"best: none, {why}")
     return [
         line
         for text in lines

@@ -13,12 +13,13 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from reachmap.cli.text.study import study_lines
 from reachmap.errors import CellError, SettingsError
 from reachmap.maps.comparison.significance import paired_interval, paired_means
 from reachmap.maps.study.format import read_study
 from reachmap.maps.study.record import Study
 from reachmap.maps.study.words import sentence
-from reachmap.maps.summary.study import main_effect
+from reachmap.maps.summary.study import main_effect, summarise_study
 from reachmap.runtime.options import RunOptions
 from reachmap.runtime.store import store_path
 from reachmap.tools.bin_scan import bin_scan
@@ -266,6 +267,29 @@ def test_an_optimised_study_is_the_same_when_it_is_resumed(tmp_path: Path) -> No
     again = optimised(6)
     assert again.stamp == made.stamp
     assert np.array_equal(again.objective, made.objective)
+
+
+def test_what_is_wrong_with_every_variant_is_told_as_it_was_given(
+    tmp_path: Path,
+) -> None:
+    """By the option, not as an override that nobody made."""
+    with pytest.raises(CellError, match="did you mean 'wall'") as told:
+        study("planar-toy", tmp_path / "s.h5", vary=["bin.wal=0.01,0.02"])
+    assert told.value.lines[0].startswith("--vary bin.wal=0.02: bin has no key")
+
+
+def test_a_study_of_which_nothing_can_be_mapped_says_so(tmp_path: Path) -> None:
+    """Nothing was required, so no requirement is to blame."""
+    made = study(
+        "planar-toy",
+        tmp_path / "s.h5",
+        vary=["scan_configuration.q_deg.joint_1=0,5"],
+        objectives=["bin_reachability"],
+        overrides=SMALL,
+    )
+    assert not made.done.any()
+    said = study_lines(summarise_study(made))
+    assert "best: none, no variant could be mapped" in said
 
 
 def test_two_designs_are_refused(tmp_path: Path) -> None:

@@ -17,6 +17,7 @@ from reachmap.maps.study.record import LOWER_IS_BETTER, Study
 from reachmap.maps.study.words import (
     changes_text,
     digits_of,
+    no_best_text,
     unit_of,
     value_texts,
 )
@@ -200,7 +201,7 @@ def draw_parallel(
     said = (
         "dark: the best, " + (changes_text(study, study.best) or "which is the base")
         if study.best >= 0
-        else "no variant meets the requirements"
+        else no_best_text(int(study.done.sum()), study.requirements)
     )
     put_title(figure, LEFT, f"{int(known.sum())} variants, {name}", said)
     return figure

@@ -6,7 +6,7 @@ import numpy as np
 
 from reachmap.maps.cycle.summary import summarise_cycle
 from reachmap.maps.study.record import Study
-from reachmap.maps.study.words import changes_text, sentence
+from reachmap.maps.study.words import changes_text, no_best_text, sentence
 from reachmap.maps.summary.bin import clearance_shares
 from reachmap.maps.summary.directions import reached_shares
 from reachmap.maps.summary.emptying import emptying_of
@@ -199,7 +199,8 @@ def _study(study: Study) -> Tile:
     question = "Which change helps most?"
     name, best = study.objective_names[0], study.best
     if best < 0:
-        return _tile(question, "none", "No variant meets the requirements.")
+        why = no_best_text(int(study.done.sum()), study.requirements)
+        return _tile(question, "none", f"{why[0].upper()}{why[1:]}.")
     if best == study.base:
         variants = count(int(study.done.sum()), "variant")
         why = f"None of {variants} has a better {name} than the base."

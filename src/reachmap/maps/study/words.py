@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Sequence
 
 from reachmap.maps.study.record import OBJECTIVES, Study
 from reachmap.text import MINUS, NONE
@@ -32,6 +33,22 @@ def estimate_text(objective: str, value: float, low: float, high: float) -> str:
 def unit_of(objective: str) -> str:
     """Unit of an objective as people read it: ``%``, ``rad`` or ``s``."""
     return UNIT_WORDS[OBJECTIVES[objective]]
+
+
+def no_best_text(done: int, requirements: Sequence[str]) -> str:
+    """Why no variant of a study is the best.
+
+    Parameters
+    ----------
+    done : int
+        Variants that were computed.
+    requirements : sequence of str
+    """
+    if not done:
+        return "no variant could be mapped"
+    if requirements:
+        return "no variant meets the requirements"
+    return "no variant has a value"
 
 
 def digits_of(objective: str) -> int:

@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Iterator
 
 from reachmap.maps.study.record import LOWER_IS_BETTER, Study
+from reachmap.maps.study.words import no_best_text
 from reachmap.maps.summary.study import (
     StudySummary,
     VariantSummary,
@@ -85,7 +86,8 @@ def _words(summary: StudySummary) -> list[Block]:
         if row >= 0
     ]
     if summary.best < 0:
-        named.append((Strong("Best: "), "none, no variant meets the requirements"))
+        why = no_best_text(summary.done, summary.requirements)
+        named.append((Strong("Best: "), f"none, {why}"))
     return [paragraph(lead), Bullets(tuple(named))]
 
 
