@@ -14,6 +14,7 @@ from reachmap.cli.options import (
     output_option,
     overwrite_option,
     seed_option,
+    unused,
 )
 from reachmap.cli.quantities import FINITE, PART
 from reachmap.cli.terminal import print_answer
@@ -83,6 +84,8 @@ def command(
 
     Example: reachmap empty bin.h5 --part 60x40x20mm
     """
+    if output is None and picture is None:
+        unused("overwrite", because="needs --output or --picture")
     from reachmap.cli.text.emptying import emptying_lines
     from reachmap.tools.empty import empty
 

@@ -32,6 +32,9 @@ def into_settings(function: Any) -> Any:
     ) -> Any:  # fmt: skip
         from reachmap.ranking.lookup.settings import CostBasis, RankSettings
 
+        for name in (names := [name for name, _ in margins]):
+            if names.count(name) > 1:
+                raise click.UsageError(f"--margin {name}: given twice.")
         if cost == "cycle":
             unused(
                 "weights", "likeness", "margins", "neighbours", "normalise",

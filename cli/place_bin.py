@@ -38,12 +38,14 @@ def parse_fixed(
     """Turn ``z=0`` into {"z": 0.0}."""
     fixed: dict[str, float] = {}
     for value in values:
-        name, equals, number = value.partition("=")
+        name, equals, text = (part.strip() for part in value.partition("="))
+        if name in fixed:
+            raise click.BadParameter(f"{name} is given twice.")
         try:
-            fixed[name.strip()] = FINITE.convert(number, parameter, ctx)
+            fixed[name] = FINITE.convert(text, parameter, ctx)
         except click.BadParameter:
             equals = ""
-        if not equals or name.strip() not in AXES:
+        if not equals or name not in AXES:
             raise click.BadParameter(
                 f"{value!r} is not NAME=NUMBER with NAME one of {', '.join(AXES)}, "
                 "such as z=0 (metres) or yaw=90 (degrees)."
@@ -107,8 +109,7 @@ region_options = compose(
 )
 @click.option(
     "--tolerance",
-    nargs=2,
-    type=FiniteRange(min=0),
+    type=(FiniteRange(0, 1), FiniteRange(0, 90)),
     metavar="SHIFT TURN",
     help="Optimise the worst case while the bin is off by up to this [m, deg]; 0 0 for "
     "the exact pose. Default: the cell's placement.tolerance.",

@@ -138,6 +138,7 @@ class QuantityCommand(click.Command):
             for name in parameter.opts
         }
         joined: list[str] = []
+        seen: set[str] = set()
         open_value = False
         for word in args:
             if open_value and QUANTITY.fullmatch(word):
@@ -145,5 +146,13 @@ class QuantityCommand(click.Command):
                 continue
             open_value = bool(joined) and joined[-1] in names
             joined.append(word)
-            open_value = open_value or (word.partition("=")[0] in names and "=" in word)
+            name, equals, _ = word.partition("=")
+            open_value = open_value or (name in names and bool(equals))
+            if name in names and name in seen:
+                raise click.UsageError(
+                    f"{name}: given twice; two quantities follow one option, as in "
+                    "--bin 5mm 1deg.",
+                    ctx,
+                )
+            seen.add(name)
         return super().parse_args(ctx, joined)

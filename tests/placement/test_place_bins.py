@@ -145,5 +145,9 @@ def test_what_is_one_bins_needs_its_name(folder, tmp_path):
     assert "name it (--bin NAME)" in said.stderr
     said = run("place-bin", folder / "workspace.h5", "-o", out, "--bin", "c")
     assert said.exit_code == 2
-    assert "no bin 'c'" in said.stderr
+    assert said.stderr == "reachmap: --bin c: pick_from: no bin 'c'; known: a, b\n"
+    one = ("--set", "pick_from=a")
+    said = run("place-bin", folder / "workspace.h5", "-o", out, *one)
+    assert said.exit_code == 2
+    assert "every bin is placed; --bin NAME places one" in said.stderr
     assert not list(tmp_path.iterdir())

@@ -215,6 +215,8 @@ def test_the_legend_of_the_curve_is_beside_it(toy, tmp_path):
         (["--bin", "5"], "expected a number with its unit"),
         (["--bin", "5mm 3mm"], "one length and one angle"),
         (["--camera", "1mm"], "the cell has no camera"),
+        (["--bin", "5mm", "--tool", "2m"], "--tool: errors must be 0 to 500 mm"),
+        (["--bin=5mm", "--bin=3deg"], "--bin: given twice; two quantities follow one"),
         (["--bin", "5mm", "--margin", "3mm"], "collision.safety_margin_m"),
         (["--bin", "5mm", "--samples", "1"], "--samples must be"),
     ],

@@ -92,6 +92,17 @@ def test_what_is_no_design_is_refused(
         factors_of(texts, toy, sampled=False)
 
 
+def test_a_latin_hypercube_needs_a_range(toy: LoadedCell) -> None:
+    """Of lists alone it would take the same values again; steps would not count."""
+    listed = factors_of(["bin.wall=0.01,0.02"], toy, sampled=True)
+    with pytest.raises(SettingsError, match="needs a range to sample"):
+        latin_hypercube(listed, 5, seed=1)
+    with pytest.raises(SettingsError, match="which --latin-hypercube samples"):
+        factors_of(["bin.wall=0.01:0.02:5"], toy, sampled=True)
+    both = factors_of(["bin.wall=0.01:0.02", "seed=1,2"], toy, sampled=True)
+    assert len({v.overrides for v in latin_hypercube(both, 6, seed=1)}) == 6
+
+
 def test_the_shipped_cell_is_the_same_with_and_without_its_parameters() -> None:
     """Expressions lead to the same numbers; the tube moves all that hangs on it."""
     cell = read_cell("ur5-eye-in-hand")

@@ -192,8 +192,12 @@ def _range(text: str, parts: Sequence[str], sampled: bool) -> tuple[float, ...]:
     low, high = float(parts[0]), float(parts[1])
     if low >= high:
         raise SettingsError(f"--vary {text}: expected LOW below HIGH")
-    if sampled:
+    if sampled and len(parts) == 2:
         return low, high
+    if sampled:
+        raise SettingsError(
+            f"--vary {text}: expected NAME=LOW:HIGH, which --latin-hypercube samples"
+        )
     if len(parts) != 3 or not parts[2].isdecimal() or not 2 <= int(parts[2]) <= 1000:
         raise SettingsError(
             f"--vary {text}: expected NAME=LOW:HIGH:N with N from 2 to 1000 "
@@ -267,6 +271,10 @@ def latin_hypercube(factors: Sequence[Factor], count: int, seed: int) -> list[Va
     """
     if not 2 <= count <= MAX_VARIANTS:
         raise SettingsError(f"--latin-hypercube {count}: from 2 to {MAX_VARIANTS}")
+    if all(factor.texts for factor in factors):
+        raise SettingsError(
+            f"--latin-hypercube {count}: needs a range to sample, --vary NAME=LOW:HIGH"
+        )
     sampler = qmc.LatinHypercube(len(factors), rng=np.random.default_rng(seed))
     return [_sampled(factors, row) for row in sampler.random(count)]
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from reachmap.cell.bins.shorthand import CHOICE
 from reachmap.cell.loading import stored_cell
 from reachmap.disk import as_path
 from reachmap.errors import SceneError, SettingsError
@@ -98,6 +99,11 @@ def place_bins(
     names = bin_names(workspace)
     if choice.bin_pose is not None:
         raise SettingsError("--bin-pose is for one bin: name it (--bin NAME)")
+    for change in overrides:
+        if change.partition("=")[0].strip() == CHOICE:
+            raise SettingsError(
+                f"--set {change:.120}: every bin is placed; --bin NAME places one"
+            )
     files = {name: named_output(output, name) for name in names}
     pictures = {
         name: None if picture is None else named_output(picture, name) for name in names

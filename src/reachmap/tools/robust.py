@@ -25,7 +25,7 @@ from reachmap.maps.provenance import cell_of_artefact
 from reachmap.maps.robustness.format import write_robustness
 from reachmap.maps.robustness.record import Certificate, Robustness
 from reachmap.motions.motion import best_rows
-from reachmap.robustness.errors import Errors, ErrorSize, unit_errors
+from reachmap.robustness.errors import SOURCES, Errors, ErrorSize, unit_errors
 from reachmap.robustness.problem import RobustnessProblem, certificates, replayed
 from reachmap.runtime.options import IN_PROCESS, RunOptions
 from reachmap.tools.prologue import refuse_cell_files
@@ -114,8 +114,10 @@ def _check(errors: Errors, samples: int, margin_m: float) -> None:
         raise SettingsError(
             "give an error: --bin 5mm 1deg, --camera 1mm 0.1deg or --tool 2mm"
         )
-    if (sizes < 0).any() or (sizes > [MAX_SHIFT_M, MAX_TURN_RAD]).any():
-        raise SettingsError("errors must be 0 to 500 mm and 0 to 45 deg")
+    wrong = ((sizes < 0) | (sizes > [MAX_SHIFT_M, MAX_TURN_RAD])).any(axis=1)
+    if wrong.any():
+        name = f"--{SOURCES[int(np.argmax(wrong))]}"
+        raise SettingsError(f"{name}: errors must be 0 to 500 mm and 0 to 45 deg")
     if not 2 <= samples <= MAX_SAMPLES:
         raise SettingsError(f"--samples must be 2 to {MAX_SAMPLES} (got {samples})")
     if margin_m < 0:

@@ -167,7 +167,7 @@ def _refuse_overrides(
         if wanted is not None and value != wanted:
             raise SettingsError(
                 f"{source}: a {FORMAT} document states its own {name} "
-                f"({shown(value)}); {wanted} is for imported lists"
+                f"({shown(value)}); another may be given for imported lists only"
             )
 
 
