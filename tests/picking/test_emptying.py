@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 
 import numpy as np
@@ -11,7 +12,7 @@ from click.testing import CliRunner
 from reachmap.cell.model.bodies import BinSpec
 from reachmap.cli import group
 from reachmap.maps import read_bin_map, write_bin_map
-from reachmap.picking.emptying import Fate, empty_heap
+from reachmap.picking.emptying import ALONG, Fate, empty_heap, place_of
 from reachmap.picking.heap import Heap, drop_heap
 from reachmap.ranking.lookup.ranker import Ranker
 from reachmap.tools.empty import empty, part_costs
@@ -99,6 +100,27 @@ def test_what_can_be_picked_does_not_depend_on_the_order():
         if a.turn[part] >= 0:
             assert (a.turn[parts] >= 0).all()
             assert (a.turn[parts] < a.turn[part]).all()
+
+
+def test_where_parts_remain_is_told_against_where_parts_lie(bin_map):
+    """Of parts all over a bin most lie near a wall; the walls count if they differ."""
+    record = read_bin_map(bin_map)
+    across = np.linspace(-0.95, 0.95, 20)
+    x, y = np.meshgrid(*(across * side / 2 for side in record.bin_inner[:2]))
+    place = np.column_stack([x.ravel(), y.ravel()])
+    heap = dataclasses.replace(
+        a_heap(np.zeros(len(place)), [[]] * len(place)),
+        position=np.column_stack([place, np.full(len(place), 0.02)]),
+    )
+    edge = (np.abs(place) / (record.bin_inner[:2] / 2)).max(axis=1)
+    rng = np.random.default_rng(1)
+    assert (edge >= ALONG).mean() > 0.6
+    everything = np.ones(len(place), bool)
+    assert place_of(record, heap, everything) == "all over the bin"
+    assert place_of(record, heap, rng.random(400) < 0.3) == "all over the bin"
+    assert place_of(record, heap, edge > 0.7) == "around the walls"
+    assert place_of(record, heap, edge < 0.5) == "in the middle"
+    assert place_of(record, heap, ~everything) == ""
 
 
 @pytest.fixture

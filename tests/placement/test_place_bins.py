@@ -14,8 +14,14 @@ from reachmap.cli import group
 from reachmap.geometry import inverse_transform
 from reachmap.maps import read_bin_map, read_placement
 from reachmap.maps.provenance import cell_of_artefact
+from reachmap.maps.robustness.format import read_robustness
+from reachmap.plots.causes import draw_causes
+from reachmap.plots.curves.robustness import draw_robustness
 from reachmap.plots.placement import draw_placement
+from reachmap.robustness.errors import Errors, ErrorSize
+from reachmap.tools.bin_scan import bin_scan
 from reachmap.tools.info import info
+from reachmap.tools.robust import robust
 from reachmap.tools.workspace_scan import workspace_scan
 
 SPEC = "{inner: [0.2, 0.12, 0.04], wall: 0.01, pose: {xyz: [%s, 0.35, -0.2]}}"
@@ -105,6 +111,20 @@ def test_what_is_said_of_a_placement_names_its_bin(folder):
         titles = [text.get_text() for text in figure.texts]
         assert any(text.endswith(f"planar-toy, bin {name}") for text in titles)
     assert info(folder / "workspace.h5").facts()["bin"] is None
+
+
+def test_what_is_said_of_a_map_and_its_robustness_names_the_bin(folder, tmp_path):
+    """In `info`, and in the titles of what is in the way and what errors cost."""
+    bin_scan(folder / "placement-b.h5", tmp_path / "bin.h5")
+    errors = Errors(bin=ErrorSize(shift_m=0.002))
+    robust(tmp_path / "bin.h5", tmp_path / "robust.h5", errors=errors, samples=2)
+    causes = draw_causes(read_bin_map(tmp_path / "bin.h5"))
+    curve = draw_robustness(read_robustness(tmp_path / "robust.h5"))
+    for name in ("bin.h5", "robust.h5"):
+        assert info(tmp_path / name).facts()["bin"] == "b"
+    for figure in (causes, curve):
+        titles = [text.get_text() for text in figure.texts]
+        assert any(text.endswith("planar-toy, bin b") for text in titles)
 
 
 def test_a_bin_by_name_is_placed_where_the_other_stands(folder, tmp_path):

@@ -10,7 +10,7 @@ import numpy as np
 
 from reachmap._typing import BoolArray, CodeArray, FloatArray, IntArray
 from reachmap.maps.records import BinMap
-from reachmap.maps.summary.emptying import wall_name
+from reachmap.maps.summary.emptying import CLEARLY, wall_name
 from reachmap.picking.heap import Heap
 
 Order = Literal["highest", "rank"]
@@ -145,15 +145,22 @@ def place_of(bin_map: BinMap, heap: Heap, stays: BoolArray) -> str:
     """Where parts lie, seen from the robot, "" where there are none."""
     if not stays.any():
         return ""
-    share = heap.position[stays, :2] / (bin_map.bin_inner[:2] / 2.0)
+    share = heap.position[:, :2] / (bin_map.bin_inner[:2] / 2.0)
+    near_wall = np.abs(share).max(axis=1) >= ALONG
+    share, beside = share[stays], near_wall[stays]
     axis = np.argmax(np.abs(share), axis=1)
     value = share[np.arange(len(share)), axis]
-    beside = np.abs(value) >= ALONG
     count = len(share)
     for k in range(2):
         for sign in (1, -1):
             if (beside & (axis == k) & (np.sign(value) == sign)).sum() >= MOST * count:
                 return f"along the {wall_name(bin_map, k, sign)} wall"
-    if beside.sum() >= MOST * count:
+    near, elsewhere = (
+        float(stays[here].mean()) if here.any() else 0.0
+        for here in (near_wall, ~near_wall)
+    )
+    if beside.sum() >= MOST * count and near >= CLEARLY * elsewhere:
         return "around the walls"
-    return "in the middle" if beside.sum() <= (1 - MOST) * count else "all over the bin"
+    if beside.sum() <= (1 - MOST) * count and elsewhere >= CLEARLY * near:
+        return "in the middle"
+    return "all over the bin"

@@ -61,10 +61,11 @@ def draw_causes(record: WorkspaceMap | BinMap) -> Figure:
         bottom -= GAP
     reached = 100.0 * causes.states.get(Status.PATH_FOUND, 0) / total
     more = len(causes.pairs) - PAIRS_SHOWN
+    context = context_of(record.provenance)
     said = (
         f"{causes.total} {kind} attempted",
         f"{more} more pairs of bodies" if more > 0 else "",
-        context_of(record.provenance).name,
+        context.bin_name if isinstance(record, BinMap) else context.name,
     )
     put_title(
         figure,

@@ -67,7 +67,7 @@ class ArtefactInfo:
     @property
     def bin_name(self) -> str:
         """Which of several bins it is about, "" where there is one, or all are."""
-        about_one = isinstance(self.record, BinMap | BinPlacement)
+        about_one = isinstance(self.record, BinMap | BinPlacement | Robustness)
         if not about_one or not at(self._cell, "bins"):
             return ""
         return text_at(self._cell, "bin", "name") or ""

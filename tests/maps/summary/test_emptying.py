@@ -67,6 +67,16 @@ def test_what_stays_is_named_by_its_wall():
     assert present(emptying_of(a_map(np.zeros((3, 6, 8), bool)))).left == 100
 
 
+@pytest.mark.parametrize("points", [(4, 5), (6, 8)])
+def test_what_stays_everywhere_is_not_at_the_walls(points):
+    """A lowest level that is lost whole, on grids with most points beside a wall."""
+    reached = np.ones((2, *points), bool)
+    reached[0] = False
+    found = present(emptying_of(a_map(reached)))
+    assert found.where == "all over the bin"
+    assert found.empties_to_m == pytest.approx(0.1)
+
+
 def test_a_full_bin_that_cannot_be_picked_everywhere_says_so():
     """There is no height that it empties to."""
     reached = np.ones((2, 4, 4), bool)

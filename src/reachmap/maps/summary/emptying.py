@@ -15,6 +15,9 @@ from reachmap.maps.summary.directions import mean_of_known, reachability_of_dire
 
 # What stays is said to be in one place if this much of it is.
 MOST = 0.6
+# Most of a bin is near a wall: "around the walls" also needs this many times as much
+# there as elsewhere.
+CLEARLY = 2.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -173,7 +176,11 @@ def _place(record: BinMap, left: FloatArray) -> str:
     near_walls = (
         edge >= 1.0 - 2.0 / min(left.shape) if min(left.shape) > 2 else edge > 0
     )
-    if float(left[near_walls].sum()) >= MOST * total:
+    elsewhere = float(left[~near_walls].mean()) if not near_walls.all() else 0.0
+    if (
+        float(left[near_walls].sum()) >= MOST * total
+        and float(left[near_walls].mean()) >= CLEARLY * elsewhere
+    ):
         return "around the walls"
     return "all over the bin"
 

@@ -11,6 +11,7 @@ from reachmap.maps.robustness.summary import (
     errors_text,
     summarise_robustness,
 )
+from reachmap.plots.parts.context import context_of
 from reachmap.plots.parts.style import (
     BIN_COLOUR,
     INK,
@@ -20,6 +21,7 @@ from reachmap.plots.parts.style import (
     grid_lines,
     new_figure,
     put_title,
+    subtitle_of,
 )
 
 
@@ -42,13 +44,17 @@ def draw_robustness(record: Robustness) -> Figure:
     for spine in ("top", "right"):
         axes.spines[spine].set_visible(False)
     given = summary.given
+    said = (
+        f"{errors_text(summary.errors)} off; of {summary.steps[0].reachability:.1f} % "
+        "without errors",
+        context_of(record.provenance).bin_name,
+    )
     put_title(
         figure,
         0.85,
         f"{given.reachability:.1f} % of the test grasps survive, "
         f"{given.certified:.1f} % for certain",
-        f"{errors_text(summary.errors)} off; of {summary.steps[0].reachability:.1f} % "
-        "without errors",
+        subtitle_of(said),
     )
     return figure
 
