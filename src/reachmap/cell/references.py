@@ -8,13 +8,17 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Collection
+from pathlib import Path
 from typing import Any
 
+from reachmap.cell.bins.shell import place_doubt, size_doubt
 from reachmap.cell.bins.shorthand import bin_places
 from reachmap.cell.files.collisions import mesh_scales
 from reachmap.cell.files.files import CellFiles, body_key
 from reachmap.cell.files.srdf import SrdfDescription
 from reachmap.cell.files.urdf import UrdfDescription
+from reachmap.cell.meshes.reading import read_mesh
+from reachmap.cell.model.bodies import BinSpec
 from reachmap.cell.model.cell import Cell
 from reachmap.cell.model.fields import MAX_LENGTH_M
 from reachmap.cell.model.shapes import sides
@@ -272,8 +276,31 @@ def _bin_warnings(document: Document, cell: Cell, files: CellFiles) -> list[str]
             continue
         key = body_key(name, spec.mesh.file)
         label, scale, where = f"mesh of {which}", spec.mesh.factors, (*place, "mesh")
-        warnings += _mesh_warnings(document, files, key, label, scale, where)
+        found = _mesh_warnings(document, files, key, label, scale, where)
+        if not found and key in files.mesh_paths:
+            found = _shell_warnings(document, spec, files.mesh_paths[key], place)
+        warnings += found
     return warnings
+
+
+def _shell_warnings(
+    document: Document, spec: BinSpec, path: Path, place: Location
+) -> list[str]:
+    """Doubts about the mesh of a bin; what puts it into its support is a mistake."""
+    factors = spec.mesh.factors if spec.mesh is not None else 1.0
+    mesh = read_mesh(path.read_bytes(), path.suffix, factors)
+    label = f"mesh {path.name}"
+    if (side := float(sides(mesh).max())) > MAX_LENGTH_M or side < NO_SIZE_M:
+        return []
+    found = []
+    if doubt := place_doubt(spec, mesh):
+        found.append(f"{document.place((*place, 'mesh'))}: {label}: {doubt}")
+    elif doubt := size_doubt(spec, mesh):
+        if spec.on is not None:
+            document.add((*place, "on"), f"{label}: {doubt}")
+        else:
+            found.append(f"{document.place((*place, 'mesh'))}: {label}: {doubt}")
+    return found
 
 
 def _part_warnings(document: Document, cell: Cell, files: CellFiles) -> list[str]:

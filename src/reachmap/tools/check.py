@@ -11,6 +11,7 @@ import numpy as np
 from reachmap._typing import FloatArray
 from reachmap.cell.bins.support import support_of, top_faces
 from reachmap.cell.loading import LoadedCell, read_cell
+from reachmap.cell.model.bodies import BinSpec
 from reachmap.cell.model.shapes import shape_text
 from reachmap.core.scene import Scene
 from reachmap.geometry import approach_directions, inverse_transform, tilt_rad
@@ -212,20 +213,30 @@ def _bodies(loaded: LoadedCell) -> tuple[BodyRow, ...]:
     T_world_base = inverse_transform(loaded.cell.T_base_world())
     faces = top_faces(loaded.cell, np.eye(4))
     for place, tray in loaded.cell.every_bin():
-        inner = " × ".join(f"{side:g}" for side in tray.inner)
-        walls = " and ".join(f"{wall:g}" for wall in dict.fromkeys(tray.walls))
-        carrier = f"{tray.carrier}, " if tray.carrier else ""
         support = support_of(tray, T_world_base @ loaded.cell.T_base_of(tray), faces)
         name = tray.name or place[-1]
         rows.append(
             BodyRow(
                 name="bin" if name == "bin" else f"bin {name}",
                 attach_to=support or "nothing (it floats)",
-                shape=f"{carrier}inside {inner} m, wall {walls} m",
+                shape=_bin_text(tray),
                 touch=tray.touch,
             )
         )
     return tuple(rows)
+
+
+def _bin_text(tray: BinSpec) -> str:
+    inner = " × ".join(f"{side:g}" for side in tray.inner)
+    walls = " and ".join(f"{wall:g}" for wall in dict.fromkeys(tray.walls))
+    said = [tray.carrier] if tray.carrier else []
+    said.append(f"inside {inner} m")
+    # Where there is a mesh it has the walls.
+    mesh = None if tray.mesh is None else tray.mesh.file.rsplit("/", 1)[-1]
+    said.append(f"wall {walls} m" if mesh is None else f"mesh {mesh}")
+    if tray.heap:
+        said.append(f"parts up to {tray.heap:g} m")
+    return ", ".join(said)
 
 
 def _rounded(values: FloatArray) -> tuple[float, ...]:
