@@ -42,6 +42,19 @@ def test_the_first_is_picked_from_unless_told(two):
     assert cell.T_base_bin()[1, 3] == pytest.approx(-0.18)
 
 
+def test_levels_within_the_parts_of_the_bin_are_named(two):
+    """Of the bin that is picked from; the heap of another is an obstacle like any."""
+    heap = "bins.right.heap=0.02"
+    fill = ["bin_scan.fill=[0.1, 0.4, 0.9]", "bin_scan.layers=null"]
+    assert not any("heap" in line for line in read_cell(two, [heap, *fill]).warnings)
+    found = read_cell(two, [heap, *fill, "pick_from=right"]).warnings
+    (line,) = (line for line in found if "heap" in line)
+    assert "grasps 5, 20 mm above the bottom lie within" in line
+    layers = [heap, "pick_from=right", "bin_scan.layers=[0.01, 0.03]"]
+    (line,) = (line for line in read_cell(two, layers).warnings if "heap" in line)
+    assert line.startswith("--set bin_scan.layers=[0.01, 0.03]: grasps 10 mm above")
+
+
 def test_a_single_bin_has_the_hash_it_had(tmp_path):
     """One bin by name is the same cell as one without."""
     single = write(tmp_path, f"bin: {LEFT}")

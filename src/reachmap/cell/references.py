@@ -256,6 +256,7 @@ def find_warnings(document: Document, cell: Cell, files: CellFiles) -> tuple[str
             warnings.append(_large(document, location, f"body {body.name!r}", side))
     warnings += _part_warnings(document, cell, files)
     warnings += _bin_warnings(document, cell, files)
+    warnings += _levels_in_heap(document, cell)
     if files.robot is not None:
         warnings += _links_unchecked(document, cell, files.robot)
         for name, scale in mesh_scales(files.robot.collisions).items():
@@ -281,6 +282,21 @@ def _bin_warnings(document: Document, cell: Cell, files: CellFiles) -> list[str]
             found = _shell_warnings(document, spec, files.mesh_paths[key], place)
         warnings += found
     return warnings
+
+
+def _levels_in_heap(document: Document, cell: Cell) -> list[str]:
+    """Name the levels of test grasps that lie within the parts in the bin."""
+    spec = cell.bin_scan
+    below = [f"{1e3 * z:.3g}" for z in spec.layers if z <= cell.bin.heap]
+    if not below or not cell.bin.heap:
+        return []
+    keys = ("fill", "fill_heights_m")
+    key = next((key for key in keys if getattr(spec, key) is not None), "layers")
+    return [
+        f"{document.place(('bin_scan', key))}: grasps {', '.join(below)} mm above the "
+        f"bottom lie within the parts of the bin's heap, {1e3 * cell.bin.heap:.3g} mm "
+        "high, which are in the way of the tool"
+    ]
 
 
 def _shell_warnings(
