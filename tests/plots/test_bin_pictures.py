@@ -10,12 +10,18 @@ import pytest
 from matplotlib.patches import FancyArrowPatch, Polygon
 from scipy.stats import binomtest
 
+from reachmap.cell.loading import read_cell
 from reachmap.cell.model.orientations import ConeFamily
 from reachmap.geometry import approach_directions, yaw_transform
 from reachmap.maps.records import Status
 from reachmap.maps.summary.directions import reached_shares
 from reachmap.maps.summary.statistics import causes_of, saturation_of, wilson_interval
-from reachmap.plots.approach import STATUS_COLOURS, draw_approach, sunburst_sectors
+from reachmap.plots.approach import (
+    STATUS_COLOURS,
+    draw_approach,
+    ring_axis,
+    sunburst_sectors,
+)
 from reachmap.plots.bin_map import (
     draw_clearance,
     draw_costs,
@@ -28,6 +34,7 @@ from reachmap.plots.parts.bin_view import percent_after
 from reachmap.plots.parts.context import context_of
 from reachmap.plots.parts.squares import whole_percent
 from reachmap.plots.placement import draw_placement, placement_titles
+from reachmap.sampling.frames import bin_test_frames
 from reachmap.sampling.orientations import orientation_set
 from tests.support.optional import present
 from tests.support.ranking_maps import make_bin_map
@@ -176,6 +183,28 @@ def test_sunburst_tiles_the_disc_once() -> None:
     assert sum(areas) == pytest.approx(np.pi)
     assert sum(sector.inner == 0.0 for sector in sectors) == 3
     assert sum(sector.border for sector in sectors) == 8
+
+
+@pytest.mark.parametrize("reference", ["world", "bin"])
+def test_rings_of_a_leaning_bin_are_the_tilts_of_its_family(reference: str) -> None:
+    """About the vertical where orientations are, about the bin's z where these are."""
+    sets = [
+        "bin.pose.rpy_deg=[0, -20, 90]",
+        f"bin_scan.orientations.reference={reference}",
+    ]
+    cell = read_cell("ur5-eye-in-hand", sets).cell
+    R_base_tcp = bin_test_frames(cell, cell.T_base_bin()).frames.orientations
+    axes = approach_directions(R_base_tcp, cell.robot.tcp.approach_axis)
+    follows_bin, R = ring_axis(cell, cell.T_base_bin())
+    assert follows_bin == (reference == "bin")
+    turned = axes @ cell.T_base_bin()[:3, :3] @ R
+    tilts = np.degrees(np.arccos(np.clip(-turned[:, 2], -1, 1)))
+    family = cell.bin_scan.orientations
+    assert isinstance(family, ConeFamily)
+    wanted = [ring.tilt_deg for ring in family.rings()]
+    assert sorted(set(np.round(tilts, 4))) == wanted
+    # The bin is tipped about its own y axis, which stays that of the picture.
+    assert R[:, 1] == pytest.approx([0, 1, 0])
 
 
 def test_sector_lies_on_the_side_the_tool_leans_to() -> None:

@@ -17,10 +17,19 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from reachmap._typing import CodeArray, FloatArray, IntArray
-from reachmap.geometry import approach_directions, rotation_from_quaternion_wxyz
+from reachmap.cell.bins.support import STEADY_DEG
+from reachmap.cell.model.cell import Cell
+from reachmap.geometry import (
+    approach_directions,
+    inverse_transform,
+    rotation_from_quaternion_wxyz,
+    tilt_rad,
+    upright_rotation,
+)
 from reachmap.maps.records import BinMap, Status
 from reachmap.maps.summary.statistics import STATUS_NAMES
 from reachmap.plots.parts.bin_view import frame_bin, view_of
+from reachmap.plots.parts.context import context_of
 from reachmap.plots.parts.squares import axis_titles, cell_edges
 from reachmap.plots.parts.style import (
     MUTED,
@@ -172,7 +181,9 @@ def draw_approach(bin_map: BinMap, layer: int = 0) -> Figure:
     width, height = (high - low) * scale_in
     figure = new_figure(LEFT + width + RIGHT, BOTTOM + height + TOP)
     axes = axes_at(figure, LEFT, BOTTOM, width, height)
-    sectors = sunburst_sectors(_directions(bin_map, layer))
+    cell = context_of(bin_map.provenance).cell
+    follows_bin, R_bin_rings = ring_axis(cell, bin_map.bin_pose)
+    sectors = sunburst_sectors(_directions(bin_map, layer) @ R_bin_rings)
     radius = 0.485 * min(
         float(np.diff(cell_edges(c)).min()) for c in (bin_map.x, bin_map.y)
     )
@@ -184,7 +195,8 @@ def draw_approach(bin_map: BinMap, layer: int = 0) -> Figure:
             )
     frame_bin(axes, view)
     axis_titles(axes, "the bin")
-    _draw_key(figure, sectors, LEFT + width + 0.25, BOTTOM + height)
+    middle = "square to the bottom" if follows_bin else "upright"
+    _draw_key(figure, sectors, LEFT + width + 0.25, BOTTOM + height, middle)
     figure.legend(
         handles=_status_handles(bin_map.status[layer]),
         loc="upper left",
@@ -205,6 +217,31 @@ def draw_approach(bin_map: BinMap, layer: int = 0) -> Figure:
         subtitle_of(said),
     )
     return figure
+
+
+def ring_axis(cell: Cell | None, bin_pose: FloatArray) -> tuple[bool, FloatArray]:
+    """What the rings of a bin's orientations are drawn about.
+
+    Parameters
+    ----------
+    cell : Cell or None
+    bin_pose : array, shape (4, 4)
+        T_base_bin.
+
+    Returns
+    -------
+    follows_bin : bool
+        Whether it is the z axis of a bin that leans, not the vertical.
+    R_bin_rings : array, shape (3, 3)
+    """
+    if cell is None:
+        return False, np.eye(3)
+    R_world_bin = (inverse_transform(cell.T_base_world()) @ bin_pose)[:3, :3]
+    if tilt_rad(R_world_bin) <= np.radians(STEADY_DEG):
+        return False, np.eye(3)
+    if cell.bin_scan.orientations.reference in ("bin", None):
+        return True, np.eye(3)
+    return False, upright_rotation(R_world_bin)
 
 
 def _directions(bin_map: BinMap, layer: int) -> FloatArray:
@@ -251,12 +288,16 @@ def _status_handles(status: CodeArray) -> list[Artist]:
 
 
 def _draw_key(
-    figure: Figure, sectors: tuple[Sector, ...], left: float, top: float
+    figure: Figure,
+    sectors: tuple[Sector, ...],
+    left: float,
+    top: float,
+    middle: str,
 ) -> None:
     """One large sunburst with words, to read the small ones by."""
     put_text(figure, left, top - 0.12, "At each point", fontsize=9.5, fontweight="bold")
     lean = "ring: the tool is tilted to that side"
-    lines = ["middle: the tool is upright", lean]
+    lines = [f"middle: the tool is {middle}", lean]
     if len({sector.inner for sector in sectors}) == 1:
         lines = [lean]
     for index, line in enumerate([*lines, "slices of a sector: its rolls, in order"]):

@@ -52,7 +52,9 @@ class BinView:
 
     def layer_text(self, layer: int) -> str:
         """Height of a layer, as ``0.05 m above the bottom``."""
-        return f"{float(self.bin_map.layer[layer]):.2f} m above the bottom"
+        height = float(self.bin_map.layer[layer])
+        digits = 2 if abs(height - round(height, 2)) < 5e-4 else 3
+        return f"{height:.{digits}f} m above the bottom"
 
 
 def view_of(bin_map: BinMap) -> BinView:
