@@ -11,6 +11,7 @@ import click
 from reachmap.cli.completing import DEFAULT_CELL
 from reachmap.cli.options import (
     INPUT_FILE,
+    NameType,
     bin_option,
     cell_option,
     check_scan_options,
@@ -41,6 +42,7 @@ log = logging.getLogger(__name__)
 )
 @click.option(
     "--part",
+    type=NameType(),
     metavar="NAME",
     help="Which of the cell's parts to pick; default: the cell's part, or the first "
     "of its parts.",

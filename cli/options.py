@@ -120,6 +120,32 @@ def _option(*declarations: str, **settings: Any) -> Decorator[Any]:
     return click.option(*declarations, cls=SharedOption, **settings)
 
 
+class SeedType(click.IntRange):
+    """A seed as cells take it: 0 or more, of 63 bits."""
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> int:
+        """Read one; click reports what is none."""
+        number = int(super().convert(value, param, ctx))
+        if number >= 2**63:
+            self.fail(f"{number} is too large; the largest is 2^63 - 1.", param, ctx)
+        return number
+
+
+class NameType(click.types.StringParamType):
+    """A name; what YAML reads as nothing would stand for the default."""
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> str:
+        """Read one; click reports what is none."""
+        text = str(super().convert(value, param, ctx))
+        if text.strip().lower() in ("", "~", "null"):
+            self.fail(f"{text!r} is not a name.", param, ctx)
+        return text
+
+
 cell_argument = click.argument(
     "cell", default=DEFAULT_CELL, metavar="[CELL]", shell_complete=complete_cells
 )
@@ -144,6 +170,7 @@ set_option = _option(
 bin_option = _option(
     "--bin",
     "bin_name",
+    type=NameType(),
     metavar="NAME",
     help="Which of the cell's bins to use; default: its pick_from.",
 )
@@ -162,7 +189,7 @@ keep_scan_option = _option(
 
 seed_option = _option(
     "--seed",
-    type=click.IntRange(min=0),
+    type=SeedType(min=0),
     metavar="N",
     help="Seed of everything random; by default the cell's.",
 )

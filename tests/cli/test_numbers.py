@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import click
@@ -32,6 +33,31 @@ def number_types() -> list[Any]:
 def run(command: str, **env: str) -> Result:
     """Run a command line in this process."""
     return CliRunner().invoke(group, command.split(), env=env)
+
+
+@pytest.mark.parametrize("name", ["robust", "empty", "workspace-scan"])
+def test_a_seed_fits_what_stores_it(name: str) -> None:
+    """It is refused before any work; `robust` had ended in an internal error."""
+    result = run(f"{name} a.h5 --seed {2**63}")
+    assert result.exit_code == 2
+    assert "is too large; the largest is 2^63 - 1." in result.stderr
+
+
+@pytest.mark.parametrize("option", ["place-bin a.h5 --bin", "bin-scan a.h5 --part"])
+@pytest.mark.parametrize("text", ["", "null", "~"])
+def test_no_name_is_not_the_default(option: str, text: str) -> None:
+    """Written down as an assignment it would take the default in silence."""
+    result = CliRunner().invoke(group, [*option.split(), text])
+    assert result.exit_code == 2
+    assert f"{text!r} is not a name." in result.stderr
+
+
+def test_a_folder_in_the_place_of_a_map_is_called_that() -> None:
+    """The folder one is in has no name to derive others from."""
+    pile = Path(__file__).parents[2] / "examples" / "pile-1.json"
+    result = run(f"rank {pile} --map .")
+    assert result.exit_code == 2
+    assert result.stderr.startswith("reachmap: .: cannot be read")
 
 
 def test_no_option_takes_what_is_no_number() -> None:

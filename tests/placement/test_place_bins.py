@@ -166,6 +166,9 @@ def test_what_is_one_bins_needs_its_name(folder, tmp_path):
     said = run("place-bin", folder / "workspace.h5", "-o", out, "--bin", "c")
     assert said.exit_code == 2
     assert said.stderr == "reachmap: --bin c: pick_from: no bin 'c'; known: a, b\n"
+    said = run("place-bin", folder / "workspace.h5", "-o", ".")
+    assert said.exit_code == 2
+    assert said.stderr == "reachmap: .: is a folder; name a file\n"
     one = ("--set", "pick_from=a")
     said = run("place-bin", folder / "workspace.h5", "-o", out, *one)
     assert said.exit_code == 2

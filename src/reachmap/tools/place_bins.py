@@ -12,8 +12,8 @@ import numpy as np
 
 from reachmap.cell.bins.shorthand import CHOICE
 from reachmap.cell.loading import stored_cell
-from reachmap.disk import as_path
-from reachmap.errors import SceneError, SettingsError
+from reachmap.disk import as_path, is_folder
+from reachmap.errors import OutputError, SceneError, SettingsError
 from reachmap.maps import (
     BinPlacement,
     WorkspaceMap,
@@ -104,6 +104,8 @@ def place_bins(
             raise SettingsError(
                 f"--set {change:.120}: every bin is placed; --bin NAME places one"
             )
+    if is_folder(output):
+        raise OutputError(f"{output}: is a folder; name a file")
     files = {name: named_output(output, name) for name in names}
     pictures = {
         name: None if picture is None else named_output(picture, name) for name in names

@@ -237,7 +237,8 @@ class Calibration:
 
 def calibration_beside(map_path: str | Path) -> Path:
     """Name of the calibration that belongs to a map: ``bin.calibration.json``."""
-    return Path(map_path).with_suffix(".calibration.json")
+    path = Path(map_path)
+    return path.parent / f"{path.stem}.calibration.json"
 
 
 def usual_calibration(map_path: str | Path, stamp: Stamp) -> Calibration | None:
