@@ -11,8 +11,8 @@ from reachmap.cell.loading import read_cell
 from reachmap.core.scene import Scene
 from reachmap.placement.mapped.candidates import Candidate
 from reachmap.placement.mapped.evaluator import open_evaluator
-from reachmap.placement.mapped.exact import PoseScore
-from reachmap.placement.mapped.sample import open_frames
+from reachmap.placement.mapped.exact import ALWAYS, NEVER, PoseScore
+from reachmap.placement.mapped.sample import COARSE, DENSE, open_frames
 from reachmap.placement.tolerance import (
     NOISE_POINTS,
     ROOM,
@@ -161,6 +161,29 @@ def test_a_loss_between_the_axes_counts():
     assert (confirmed.lost > 0).sum() == 1
     away = present(away_from_losses(POSE, TOLERANCE, confirmed, 0.0, 0.5))
     assert np.subtract(away, POSE) == pytest.approx([0.015, -0.015, 0.0, 0.0])
+
+
+def test_what_a_thin_sample_understates_is_looked_at_with_every_orientation():
+    """Two neighbours lose the same in the thin sample; all grasps tell them apart."""
+
+    def thin(pose):
+        return 90.0 - 0.1 * ((np.array(pose) - POSE)[3] > 0.0)
+
+    class Sampled(ClosedForm):
+        def evaluate(self, poses, q, *, above=ALWAYS, enough=NEVER, grid=COARSE):
+            every = grid == DENSE
+            self.formula = dense if every else thin
+            return super().evaluate(poses, q, above=above, enough=enough, grid=grid)
+
+    def dense(pose):
+        x, _, _, yaw = (np.array(pose) - POSE) / SCALE
+        return 90.0 - 1.0 * (yaw > 0.0 and x < -0.9) - 0.01 * (yaw > 0.0)
+
+    evaluator, found = Sampled(thin), candidate(POSE, thin)
+    quick = worst_case(found, TOLERANCE, None, lambda pose: True, evaluator)
+    assert quick.score == 90.0
+    confirmed = confirmed_worst(found, quick, TOLERANCE, None, evaluator)
+    assert confirmed.score == pytest.approx(88.99)
 
 
 def test_the_worst_case_bounds_poses_inside_a_cone():

@@ -41,6 +41,7 @@ def placement_settings() -> dict[str, Any]:
             "moves": steadying.MOVES,
             "nudge": [steadying.NUDGE_POINTS, steadying.NUDGES],
             "noise_points": tolerance.NOISE_POINTS,
+            "suspects": tolerance.SUSPECTS,
             "least_error": steadying.LEAST_ERROR,
             "room": tolerance.ROOM,
         },
