@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from itertools import islice
 
 import coal
@@ -24,6 +25,7 @@ from reachmap.placement.mapped.imaging import (
     imaging_configurations,
     is_in_picture,
     picture_of,
+    why_unseen,
 )
 from reachmap.placement.mapped.sample import THIN, open_frames, sample_of
 from reachmap.placement.mapped.viewpoints import (
@@ -208,6 +210,30 @@ def test_the_arm_waits_where_it_does_not_hide_the_bin():
             for x, y, z in np.array(ways)
         ]
         assert (not any(hits)) == is_free
+
+
+def test_parts_in_the_bin_do_not_hide_what_is_picked_above_them():
+    """The same configurations image a bin with parts under the pick volume."""
+    filled = "bin.heap=0.028", "bin_scan.layers=[0.03]"
+    empty = placed_ur5((0.5, 0.0, 0.0, 1.57), filled[1]).scene
+    full = placed_ur5((0.5, 0.0, 0.0, 1.57), *filled).scene
+    wanted = list(islice(imaging_configurations(empty), 3))
+    found = list(islice(imaging_configurations(full), 3))
+    np.testing.assert_array_equal(found, wanted)
+    assert [picture_of(full, q) for q in found] == ["", "", ""]
+
+
+def test_what_hides_the_bin_everywhere_is_named():
+    """A plate over the bin with room for the arm above it; a range out of reach."""
+    plate = (
+        "{name: plate, attach_to: world, touch: [bin], shape: {box: [0.5, 0.5, 0.01]}"
+    )
+    plate = f"bodies=[{plate}, pose: {{xyz: [0.6, 0.0, 0.12]}}}}]"
+    scene = placed_ur5((0.6, 0.0, 0.0, 1.57), plate).scene
+    assert next(imaging_configurations(scene), None) is None
+    assert re.fullmatch(r"plate hides it from (\d+) of \1 conf.*", why_unseen(scene))
+    far = placed_ur5((0.6, 0.0, 0.0, 1.57), "camera.range_m=[2.4,2.5]").scene
+    assert "nowhere within its range" in why_unseen(far)
 
 
 def test_a_camera_may_be_fixed_to_a_body():

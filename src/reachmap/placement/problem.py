@@ -29,6 +29,7 @@ from reachmap.placement.mapped.imaging import (
     imaging_configurations,
     is_in_picture,
     picture_of,
+    why_unseen,
 )
 from reachmap.placement.predicted.places import (
     best_at_each_place,
@@ -167,11 +168,21 @@ class PlacementProblem:
         """
         if self.keep_scan and self.still_camera is None:
             return True
-        changed = self.loaded.with_changes(bin_pose=self.T_base_bin(pose))
-        scene = self.moving.with_bin_of(changed)
+        scene = self._scene_at(pose)
         if self.keep_scan:
             return not picture_of(scene, scene.scan_configuration)
         return next(imaging_configurations(scene), None) is not None
+
+    def why_unseen(self, pose: Pose) -> str:
+        """What keeps the bin at a pose from being imaged, or "" if that is unknown."""
+        scene = self._scene_at(pose)
+        if self.still_camera is not None:
+            return picture_of(scene, scene.scan_configuration)
+        return why_unseen(scene)
+
+    def _scene_at(self, pose: Pose) -> Scene:
+        changed = self.loaded.with_changes(bin_pose=self.T_base_bin(pose))
+        return self.moving.with_bin_of(changed)
 
     @property
     def start(self) -> FloatArray | None:

@@ -85,9 +85,11 @@ def _finalists(
         is_unseen = any(place is other for other in unseen)
         table.add(Candidate(pose=place.pose, reason=UNSEEN) if is_unseen else place)
     if unseen and not found:
+        why = problem.why_unseen(unseen[0].pose)
         raise SceneError(
             f"{problem.loaded.source}: {UNSEEN} at any of the {len(unseen)} best "
-            f"places; look elsewhere with --heights or --region, or {REMEDY}"
+            f"places{f' ({why})' if why else ''}; look elsewhere with --heights or "
+            f"--region, or {REMEDY}"
         )
     return found
 

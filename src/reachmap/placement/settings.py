@@ -59,6 +59,7 @@ def placement_settings() -> dict[str, Any]:
             "apart_rad": imaging.APART_RAD,
             "parking_turns_deg": list(imaging.PARKING_TURNS_DEG),
             "parking_samples": imaging.PARKING_SAMPLES,
+            "most_hidden": imaging.MOST_HIDDEN,
             "equal_points": scan_choice.EQUAL_POINTS,
         },
     }

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterator, Sequence
 from functools import lru_cache
+from itertools import islice
 
 import numpy as np
 
@@ -21,6 +23,10 @@ from reachmap.placement.mapped.viewpoints import (
 
 # Configurations nearer than this are the same to a planner.
 APART_RAD = 0.4
+# Configurations that are hidden from the bin until no more are tried: five times as
+# many as were found before one that is not, over 48 poses in four cells. Of so many it
+# is said what hides it.
+MOST_HIDDEN, LOOKS_EXPLAINED = 2000, 200
 # Corners of the volume lie in its walls, where no line of sight ends.
 INSET_M = 0.001
 UNSEEN = "no scan configuration images the bin"
@@ -65,12 +71,54 @@ def imaging_configurations(
     array, shape (dof,)
         [rad].
     """
-    cell = scene.loaded.cell
-    assert cell.camera is not None
     camera = Camera(scene.robot, scene.loaded)
     if camera.stands:
         yield from _parking_configurations(scene, camera, goals, frame)
         return
+    chosen: list[FloatArray] = []
+    hidden = 0
+    for q, body in _looks(scene, camera, goals, frame, apart_from=chosen):
+        if not body:
+            chosen.append(q)
+            yield q
+            continue
+        hidden += 1
+        if hidden == MOST_HIDDEN:
+            return
+
+
+def why_unseen(scene: Scene) -> str:
+    """Say what keeps a camera on the tool from imaging the bin of a scene.
+
+    Parameters
+    ----------
+    scene : Scene
+        Of a cell with a camera on the tool, with the bin.
+    """
+    camera = Camera(scene.robot, scene.loaded)
+    looks = list(islice(_looks(scene, camera, None, None), LOOKS_EXPLAINED))
+    if not looks:
+        return "the arm can hold the camera nowhere within its range of the bin"
+    hiding = Counter(body for _, body in looks if body)
+    if not hiding:
+        return ""
+    body, count = hiding.most_common(1)[0]
+    return f"{body} hides it from {count} of {len(looks)} configurations"
+
+
+def _looks(
+    scene: Scene,
+    camera: Camera,
+    goals: FloatArray | None,
+    frame: IntArray | None,
+    apart_from: Sequence[FloatArray] = (),
+) -> Iterator[tuple[FloatArray, str]]:
+    """Free configurations that face the bin, and which body hides part of it, or "".
+
+    Those that are near to one of ``apart_from``, which may grow, are left out.
+    """
+    cell = scene.loaded.cell
+    assert cell.camera is not None
     T_bin_camera, missing = _views(cell.bin.inner, cell.bin_scan.layers, cell.camera)
     T_base_camera = scene.T_base_bin @ T_bin_camera
     Q, pose = scene.kinematics.solve_many(
@@ -84,17 +132,13 @@ def imaging_configurations(
         free = scene.checker.free_mask(Q)
         Q, pose = Q[free], pose[free]
     corners = _corners(scene)
-    chosen: list[FloatArray] = []
     for k in np.lexsort((_farness(Q, goals, frame), missing[pose])):
         q = Q[k]
-        if any(np.linalg.norm(q - other) < APART_RAD for other in chosen):
+        if any(np.linalg.norm(q - other) < APART_RAD for other in apart_from):
             continue
         if goals is None and not is_free(q):
             continue
-        if camera.hidden_by(q, T_base_camera[pose[k]], corners):
-            continue
-        chosen.append(q)
-        yield q
+        yield q, camera.hidden_by(q, T_base_camera[pose[k]], corners)
 
 
 def picture_of(scene: Scene, q: FloatArray) -> str:
@@ -182,12 +226,12 @@ def _farness(
 
 
 def _corners(scene: Scene) -> FloatArray:
-    """Corners of the pick volume in robot_base, clear of walls and bottom."""
+    """Corners of the pick volume in robot_base, clear of walls, bottom and heap."""
     cell, T_base_bin = scene.loaded.cell, scene.T_base_bin
     volume = view_of(cell.bin.inner, cell.bin_scan.layers).volume
     middle = volume.mean(axis=0)
     half = np.maximum(np.abs(volume - middle) - INSET_M, INSET_M)
     corners = middle + np.sign(volume - middle) * half
-    # A pick volume without height is looked at just above the bottom.
-    corners[:, 2] = np.maximum(corners[:, 2], INSET_M)
+    # Without height it is looked at just above the bottom, or above what lies there.
+    corners[:, 2] = np.maximum(corners[:, 2], cell.bin.heap + INSET_M)
     return np.asarray(corners @ T_base_bin[:3, :3].T + T_base_bin[:3, 3])
