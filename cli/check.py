@@ -86,8 +86,8 @@ def _lines(answer: CellCheck, *, verbose: bool) -> Iterator[str]:
     yield f"scans   {frames} test frames, {grasps} test grasps"
     if answer.below_rim_m > 0:
         yield (
-            f"approach  {answer.approach_m:g} m, starts up to {answer.below_rim_m:g} m "
-            "below the rim (bin_scan.approach_distance_m: clear_rim starts above it)"
+            f"approach  {answer.approach_m:g} m, starts up to {answer.below_rim_m:.3g} "
+            "m below the rim (bin_scan.approach_distance_m: clear_rim starts above it)"
         )
     else:
         yield f"approach  {answer.approach_m:g} m, starts above the rim"
