@@ -24,8 +24,9 @@ from reachmap.placement.tolerance import (
 # Poses whose neighbours are looked at, how far below the best they may score, and
 # how often each of them is moved away from what its neighbours lose.
 TRIED, BELOW_POINTS, MOVES = 2, 3.0, 1
-# A confirmed loss from which on a pose is nudged, by what its tolerance leaves of the
-# room it is moved by; about the least that the thin sample of the shipped cell can see.
+# Confirmed loss from which a pose is nudged, a little more than one grasp of the thin
+# sample counts in the shipped cell; how often; and how far [tolerances], so that what
+# was lost at the edge of the tolerance has as much room as anywhere.
 NUDGE_POINTS, NUDGES, NUDGE = 0.25, 2, ROOM - 1.0
 # What a margin may cost, as everywhere; equal within this are worst cases at least.
 MARGIN_POINTS, LEAST_ERROR = 5.0, 0.1
@@ -37,8 +38,9 @@ def steadied(problem: PlacementProblem, mapped: list[Candidate]) -> list[Candida
     The best few are looked at with their neighbours, and each is moved away from what
     its neighbours lose. Of worst cases that are equal within the error
     of the scores the widest margin decides, then the shorter paths, then how square the
-    bin stands. The worst case of the first is confirmed with more test grasps; where
-    it was too high, those of its rivals are, too.
+    bin stands. The worst case of the first is confirmed with more test grasps, and the
+    pose nudged away from what that shows; where it was too high, those of its rivals
+    are confirmed, too.
 
     Parameters
     ----------

@@ -63,12 +63,12 @@ class Tolerance:
         """Poses on the edge that :meth:`offsets` leaves out, less the pose, (n, 4).
 
         The directions of the plane with the other turn, and those between them with
-        either.
+        either. Of a tolerance without shift, the offsets themselves.
         """
         straight = self.offsets()
         straight = straight[straight[:, 2] == 0.0] * (1.0, 1.0, 1.0, -1.0)
         if not self.shift_m:
-            return np.asarray(straight[:0])
+            return np.asarray(straight)
         turns = np.array([1.0, -1.0])
         angle, turn = np.meshgrid(np.radians([45, 135, 225, 315]), turns, indexing="ij")
         unit = [np.cos(angle), np.sin(angle), np.zeros(angle.shape), turn]

@@ -23,9 +23,9 @@ from reachmap.placement.mapped.viewpoints import (
 
 # Configurations nearer than this are the same to a planner.
 APART_RAD = 0.4
-# Configurations that are hidden from the bin until no more are tried: five times as
-# many as were found before one that is not, over 48 poses in four cells. Of so many it
-# is said what hides it.
+# Hidden configurations after which a place counts as not imaged: five times the most
+# that came before a clear one, over 48 poses in four cells. And how many are looked at
+# to say what hides the bin.
 MOST_HIDDEN, LOOKS_EXPLAINED = 2000, 200
 # Corners of the volume lie in its walls, where no line of sight ends.
 INSET_M = 0.001
