@@ -29,7 +29,9 @@ def test_everything_but_the_poisoned_unit_is_there(tmp_path, monkeypatch):
     assert failure.value.exit_code == 3
     part = read_bin_map(path)
     lost = np.zeros(whole.status.shape, bool)
-    lost.flat[poisoned_bin.POISONED * GRASPS_PER_UNIT :][:GRASPS_PER_UNIT] = True
+    first = poisoned_bin.POISONED * GRASPS_PER_UNIT
+    lost.flat[first : first + GRASPS_PER_UNIT] = True
+    assert lost.sum() == GRASPS_PER_UNIT
     assert (part.status[lost] == Status.ERROR).all()
     np.testing.assert_array_equal(part.status[~lost], whole.status[~lost])
     np.testing.assert_array_equal(part.path_length[~lost], whole.path_length[~lost])
