@@ -308,15 +308,14 @@ def _shell_warnings(
     label = f"mesh {path.name}"
     if (side := float(sides(mesh).max())) > MAX_LENGTH_M or side < NO_SIZE_M:
         return []
-    found = []
-    if doubt := place_doubt(spec, mesh):
-        found.append(f"{document.place((*place, 'mesh'))}: {label}: {doubt}")
-    elif doubt := size_doubt(spec, mesh):
-        if spec.on is not None:
-            document.add((*place, "on"), f"{label}: {doubt}")
-        else:
-            found.append(f"{document.place((*place, 'mesh'))}: {label}: {doubt}")
-    return found
+    misplaced = place_doubt(spec, mesh)
+    doubt = misplaced or size_doubt(spec, mesh)
+    if not doubt:
+        return []
+    if spec.on is not None and not misplaced:
+        document.add((*place, "on"), f"{label}: {doubt}")
+        return []
+    return [f"{document.place((*place, 'mesh'))}: {label}: {doubt}"]
 
 
 def _part_warnings(document: Document, cell: Cell, files: CellFiles) -> list[str]:
