@@ -161,9 +161,8 @@ def _nudged(problem: PlacementProblem, candidate: Candidate, least: float) -> Ca
     worst = _confirmed_worst(problem, candidate)
     here = best = dataclasses.replace(candidate, worst=worst.score)
     for _ in range(NUDGES):
-        if worst.score < max(least, best.worst or 0.0, LEAST_ERROR):
-            break
-        if worst.lost.max() < NUDGE_POINTS:
+        is_behind = worst.score < max(least, best.worst or 0.0, LEAST_ERROR)
+        if is_behind or worst.lost.max() < NUDGE_POINTS:
             break
         moved = _moved(
             problem, here, worst, above=worst.score, slack=NUDGE_POINTS, by=NUDGE
