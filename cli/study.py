@@ -109,14 +109,14 @@ def command(
 
     CELL is a shipped cell by name, or the path of a cell file. Each variant is mapped
     with the same seed and compared frame by frame with the variant that is closest to
-    the cell as it is. A variant that fails is a row with its cause. After Ctrl-C the
-    same command resumes.
+    the cell as it is. A variant that fails is a row with its cause; if all fail, the
+    exit code is 2. After Ctrl-C the same command resumes.
 
     Example: reachmap study ur5-eye-in-hand --vary tube_length=0.119,0.219,0.319
     """
     from reachmap.cli.text.study import study_lines
     from reachmap.maps.summary.study import summarise_study
-    from reachmap.tools.study import require_feasible, study
+    from reachmap.tools.study import require_feasible, require_mapped, study
 
     result = study(cell, output, run=run, **settings)
     summary = summarise_study(result)
@@ -125,4 +125,5 @@ def command(
         lambda: "\n".join([*study_lines(summary), str(output)]),
         as_json=as_json,
     )
+    require_mapped(result)
     require_feasible(result)

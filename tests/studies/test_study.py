@@ -82,6 +82,22 @@ def test_what_is_wrong_in_every_variant_is_wrong_input(tmp_path: Path) -> None:
     assert not [*tmp_path.iterdir()]
 
 
+def test_a_study_whose_variants_all_fail_ends_as_wrong_input(tmp_path: Path) -> None:
+    """Like a cell that cannot be read at all; its file still tells the causes."""
+    made = reachmap(
+        tmp_path, "study", "planar-toy", "--require", "points >= 1", "-o", "s.h5", "-q",
+        "--vary", "scan_configuration.q_deg.joint_1=0,1",
+    )  # fmt: skip
+    assert made.returncode == 2
+    lines = made.stderr.splitlines()
+    assert [line for line in lines if "no variant could be mapped" in line] == lines[
+        -1:
+    ]
+    assert "link_1 touches post" in lines[-1]
+    assert "Variants that failed" in made.stdout
+    assert all("touches" in cause for cause in read_study(tmp_path / "s.h5").cause)
+
+
 @pytest.mark.slow
 def test_a_placed_bin_is_that_of_place_bin(tmp_path: Path) -> None:
     """With --place each variant rests on a placement, by content hash."""

@@ -14,9 +14,9 @@ from typing import Any
 from reachmap.cell.loading import LoadedCell, read_cell
 from reachmap.cell.text.overrides import given_as
 from reachmap.core.memo import fingerprint
-from reachmap.errors import CellError, GateFailedError, SettingsError
+from reachmap.errors import CellError, GateFailedError, SceneError, SettingsError
 from reachmap.maps import Stamp, collect_provenance, config_sha256
-from reachmap.maps.study.record import ALWAYS, OBJECTIVES, Study
+from reachmap.maps.study.record import ALWAYS, OBJECTIVES, Study, VariantStatus
 from reachmap.runtime.job import Job, Stages, Work
 from reachmap.runtime.options import IN_PROCESS, RunOptions
 from reachmap.runtime.run import run_scan
@@ -377,6 +377,13 @@ def _job(
         objectives=objectives, places_bin=places_bin, workspaces=workspaces
     )
     return Job(function=compute_variant, context=context, tally=tally)
+
+
+def require_mapped(result: Study) -> None:
+    """Raise SceneError if no variant could be mapped: the cell is wrong in all."""
+    causes = [cause for cause in result.cause if cause]
+    if causes and VariantStatus.DONE not in result.status:
+        raise SceneError(f"no variant could be mapped; the first: {causes[0]}")
 
 
 def require_feasible(result: Study) -> None:
