@@ -418,3 +418,15 @@ def test_with_something_to_stand_on_every_pose_stands_on_it(toy, tmp_path):
             u, v = sx * half[0], sy * half[1]
             assert abs(x + c * u - s * v) <= 0.6 + 1e-6
             assert abs(y + s * u + c * v - 0.5) <= 0.3 + 1e-6
+
+
+def test_a_region_that_runs_backwards_is_refused_before_the_map_is_read(tmp_path):
+    """Which would be refused itself."""
+    (tmp_path / "w.h5").write_text("no map")
+    for limits, said in (
+        (("--region", "0.8", "0.2", "0", "1"), "x from 0.8 to 0.2"),
+        (("--heights", "0.3", "0.1"), "z from 0.3 to 0.1"),
+    ):
+        result = place(tmp_path / "w.h5", *limits, "-o", tmp_path / "p.h5")
+        assert result.exit_code == 2
+        assert result.stderr.startswith(f"reachmap: {said}: expected two numbers")

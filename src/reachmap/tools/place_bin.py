@@ -100,6 +100,12 @@ class PlacementChoice:
     keep_scan_configuration : bool
         Leave the cell's own, as is also done without a camera, or with one on a link
         between base and tool.
+
+    Raises
+    ------
+    SettingsError
+        A range runs backwards or ends nowhere, an axis or rule is unknown, or no place
+        is left.
     """
 
     rule: str = "search"
@@ -109,6 +115,11 @@ class PlacementChoice:
     top: int = 5
     tolerance: tuple[float, float] | None = None
     keep_scan_configuration: bool = False
+
+    def __post_init__(self) -> None:
+        if self.rule not in RULES:
+            raise SettingsError(f"rule {self.rule!r}: expected {' or '.join(RULES)}")
+        check_places(self.limits, self.fixed, axes=AXES, top=self.top)
 
 
 def place_bin(
@@ -150,7 +161,6 @@ def place_bin(
     workspace, output = Path(workspace), Path(output)
     picture = as_path(picture)
     choice = choice or PlacementChoice()
-    check_choice(choice)
     check_picture(picture, "--picture")
     check_outputs([output, picture], overwrite=run.overwrite, inputs=[workspace])
     workspace_map = read_workspace_map(workspace)
@@ -281,13 +291,6 @@ def _still_camera(scene: Scene) -> FloatArray | None:
         return None
     camera = Camera(scene.robot, scene.loaded)
     return None if camera.is_carried else camera.T_base_camera(scene.scan_configuration)
-
-
-def check_choice(choice: PlacementChoice) -> None:
-    """Refuse wrong settings before the work is done."""
-    if choice.rule not in RULES:
-        raise SettingsError(f"rule {choice.rule!r}: expected {' or '.join(RULES)}")
-    check_places(choice.limits, choice.fixed, axes=AXES, top=choice.top)
 
 
 def _region(

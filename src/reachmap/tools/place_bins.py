@@ -24,12 +24,7 @@ from reachmap.maps import (
 from reachmap.maps.bytes.publish import check_picture
 from reachmap.maps.provenance import cell_of_artefact
 from reachmap.runtime.options import IN_PROCESS, RunOptions
-from reachmap.tools.place_bin import (
-    PlacedBin,
-    PlacementChoice,
-    check_choice,
-    placed_bin,
-)
+from reachmap.tools.place_bin import PlacedBin, PlacementChoice, placed_bin
 from reachmap.tools.placement_picture import draw_placed
 from reachmap.tools.prologue import refuse_cell_files, with_seed
 
@@ -95,7 +90,6 @@ def place_bins(
     """
     workspace, output, picture = Path(workspace), Path(output), as_path(picture)
     choice = choice or PlacementChoice()
-    check_choice(choice)
     names = bin_names(workspace)
     if choice.bin_pose is not None:
         raise SettingsError("--bin-pose is for one bin: name it (--bin NAME)")
