@@ -121,6 +121,22 @@ def test_shards_and_workers_make_the_same_map(tmp_path):
     assert merged.stamp.content_sha256 == alone.stamp.content_sha256
 
 
+def test_progress_names_levels_in_percent(tmp_path, capsys):
+    """Each level has its own stages, told by how full the bin is."""
+    scan(
+        tmp_path / "p.h5",
+        "bin_scan.fill=[0.2, 0.825]",
+        "bin_scan.grid=[2,1]",
+        cell="planar-toy",
+        run=RunOptions(quiet=False),
+    )
+    said = capsys.readouterr().err.splitlines()
+    for stage in ("survey", "connect"):
+        for percent in ("20%", "82.5%"):
+            label = f"bin-scan {stage} at {percent} fill "
+            assert any(line.startswith(label) for line in said)
+
+
 def test_levels_are_written_out_as_layers():
     """In metres, also when depth or levels of a stored cell change."""
     loaded = read_cell("planar-toy", [TOY_FILL])
