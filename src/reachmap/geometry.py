@@ -161,6 +161,15 @@ def quaternion_wxyz_from_rotation(R: npt.ArrayLike) -> FloatArray:
     return np.asarray(q.reshape(*R.shape[:-2], 4))
 
 
+def nearest_rotation(R: npt.ArrayLike) -> FloatArray:
+    """Rotations nearest to matrices that are some but for rounding, (..., 3, 3).
+
+    The orthogonal factor of the polar decomposition.
+    """
+    U, _, V_t = np.linalg.svd(np.asarray(R, float))
+    return np.asarray(U @ V_t)
+
+
 def rotation_angle(R_a: FloatArray, R_b: FloatArray) -> FloatArray:
     """Angle of the rotation between two orientations [rad], in [0, π].
 

@@ -129,6 +129,27 @@ def test_roll_can_be_freed_and_fixed():
     assert free.cost[0] <= as_given.cost[0]
 
 
+@pytest.mark.parametrize("roll", ["as-given", "free", "fixed"])
+def test_printed_matrices_rank_as_the_rotations_they_stand_for(roll: Roll):
+    """Rounded to three decimals or scaled a little: the nearest rotation is taken."""
+    rng = np.random.default_rng(4)
+    q = BIN_MAP.quaternion_wxyz.reshape(-1, 4)
+    rows = rng.integers(len(q), size=60)
+    near = Rotation.from_quat(np.roll(q[rows], -1, axis=1)) * Rotation.from_rotvec(
+        rng.normal(scale=0.1, size=(60, 3))
+    )
+    points = np.repeat(BIN_MAP.position.reshape(-1, 3), len(q) // 35, axis=0)[rows]
+    exact = near.as_matrix()
+    for printed in (np.round(exact, 3), 0.996 * exact, 1.004 * exact):
+        # SciPy's own nearest rotation.
+        meant = Rotation.from_matrix(printed).as_matrix()
+        ranking = RANKER.rank(points, rotations=printed, roll=roll)
+        wanted = RANKER.rank(points, rotations=meant, roll=roll)
+        np.testing.assert_array_equal(ranking.test_grasp, wanted.test_grasp)
+        np.testing.assert_array_equal(ranking.order, wanted.order)
+        np.testing.assert_allclose(ranking.angle, wanted.angle, atol=1e-6)
+
+
 def test_a_fixed_roll_of_a_direction_is_the_upright_tool_turned():
     """Where the family has the direction, its roll 0 is the match, exactly."""
     orientations = np.arange(0, 27, 3)

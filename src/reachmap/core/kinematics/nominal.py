@@ -14,7 +14,7 @@ import numpy as np
 from reachmap._typing import FloatArray
 from reachmap.core.kinematics.least_squares import matrix_difference
 from reachmap.core.robot.chain import SerialChain
-from reachmap.geometry import transform_from_parts
+from reachmap.geometry import nearest_rotation, transform_from_parts
 
 # Largest tilt [rad] and distance [m] that rounding of numbers explains.
 _LAST_PLACES = 1e-9
@@ -48,8 +48,7 @@ def rounded_arm(chain: SerialChain) -> SerialChain:
     nearest = np.abs(np.abs(R)[..., None] - _PLAIN).argmin(axis=-1)
     plain = np.copysign(_PLAIN[nearest], R)
     R = np.where(np.abs(plain - R) < _ROUNDED_ANGLE, plain, R)
-    U, _, V_t = np.linalg.svd(R)
-    T = transform_from_parts(U @ V_t, T[:, :3, 3])
+    T = transform_from_parts(nearest_rotation(R), T[:, :3, 3])
     zero = [T[0]]
     for step in T[1:]:
         zero.append(zero[-1] @ step)

@@ -11,6 +11,7 @@ import numpy as np
 from reachmap._typing import BoolArray, FloatArray
 from reachmap.geometry import (
     approach_directions,
+    nearest_rotation,
     rotation_from_quaternion_wxyz,
     transform_from_parts,
 )
@@ -148,9 +149,7 @@ def _rotations(grasps: Sequence[Mapping[str, Any]]) -> FloatArray:
     for form, rows in by_form.items():
         values = np.array([grasps[n][form] for n in rows], dtype=float)
         if form == "rotation_matrix":
-            # Polar decomposition: the nearest rotation to printed digits.
-            U, _, Vt = np.linalg.svd(values)
-            R[rows] = U @ Vt
+            R[rows] = nearest_rotation(values)  # printed digits are off a little
         else:
             wxyz = values if form.endswith("wxyz") else np.roll(values, 1, axis=1)
             R[rows] = rotation_from_quaternion_wxyz(wxyz)

@@ -20,6 +20,7 @@ from reachmap.geometry import (
     approach_directions,
     axis_vector,
     inverse_transform,
+    nearest_rotation,
     quaternion_wxyz_from_rotation,
     rotation_between,
     rotation_from_quaternion_wxyz,
@@ -214,8 +215,9 @@ def align(R: FloatArray, directions: FloatArray, tcp_axis: str) -> FloatArray:
     return np.asarray(rotation_between(own, directions) @ R)
 
 
-# Printed matrices have three decimals.
+# Printed matrices have three decimals; those of arithmetic are off by far less.
 ORTHONORMAL_WITHIN = 1e-2
+EXACT_WITHIN = 1e-12
 ROWS_NAMED = 12
 
 
@@ -239,7 +241,8 @@ def queries_from_arrays(
     directions : array_like, shape (n, 3), optional
         Approach directions into the object; their length does not matter.
     rotations : array_like, shape (n, 3, 3), optional
-        TCP orientations. A row of NaN has none; its direction counts then.
+        TCP orientations, of which the nearest rotations are taken. A row of NaN has
+        none; its direction counts then.
     roll : {"as-given", "free", "fixed"}
         A direction whose roll is to be fixed gets the orientation of
         :func:`complete_rotation`.
@@ -263,7 +266,7 @@ def queries_from_arrays(
     if rotations is not None:
         R = _rows(rotations, "rotations", (3, 3), n)
         has_rotation = np.logical_not(np.isnan(R).all(axis=(1, 2)))
-        known = _is_rotation(R)
+        known, R = _as_rotations(R)
         axes = np.where(known[:, None], R @ axis_vector(table.approach_axis), np.nan)
     if directions is not None:
         given = _unit(_rows(directions, "directions", (3,), n))
@@ -276,7 +279,6 @@ def queries_from_arrays(
     as_given: BoolArray = np.logical_not(known)
     free = as_given if roll == "as-given" else np.full(n, roll == "free")
     if roll == "fixed" and not known.all():
-        R = R.copy()
         R_bin = table.T_base_bin[:3, :3]
         R[~known] = complete_rotation(axes[~known], R_bin, table.approach_axis)
     return Queries(
@@ -326,12 +328,16 @@ def _rows(
     return array
 
 
-def _is_rotation(R: FloatArray) -> BoolArray:
-    """Which matrices are proper rotations, as printed to three decimals; (n,)."""
-    with np.errstate(invalid="ignore"):
+def _as_rotations(R: FloatArray) -> tuple[BoolArray, FloatArray]:
+    """Which matrices are rotations, as printed to three decimals, and the nearest."""
+    with np.errstate(invalid="ignore", over="ignore"):
         skew = np.abs(np.swapaxes(R, 1, 2) @ R - np.eye(3)).max(axis=(1, 2), initial=0)
         handed = np.sum(np.cross(R[:, :, 0], R[:, :, 1]) * R[:, :, 2], axis=1)
-        return np.asarray((skew <= ORTHONORMAL_WITHIN) & (handed > 0))
+        known: BoolArray = (skew <= ORTHONORMAL_WITHIN) & (handed > 0)
+    rounded = known & (skew > EXACT_WITHIN)
+    R = R.copy()
+    R[rounded] = nearest_rotation(R[rounded])
+    return known, R
 
 
 def _complaint(rows: list[int]) -> str:
