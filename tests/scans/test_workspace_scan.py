@@ -65,6 +65,18 @@ def test_the_map_of_the_toy_is_the_closed_form(tmp_path, method):
     assert seen >= {"no_ik", "behind", "reachable"}
 
 
+def test_progress_ends_with_what_is_not_reached(tmp_path, capsys):
+    """All frames with a collision-free configuration are counted, as in the map."""
+    workspace_scan("planar-toy", tmp_path / "w.h5", run=RunOptions(quiet=False))
+    cubes = read_workspace_map(tmp_path / "w.h5").cubes.values()
+    reached = sum(int((c.status == Status.PATH_FOUND).sum()) for c in cubes)
+    missed = sum(int((c.status == Status.NO_PATH_FOUND).sum()) for c in cubes)
+    assert missed > 0
+    last = capsys.readouterr().err.splitlines()[-1]
+    frames = reached + missed
+    assert f" {frames}/{frames} (100%) ok {100 * reached / frames:.1f}% " in last
+
+
 def test_percentages_are_eq_1_over_pooled_frames(tmp_path):
     """The stitched percentages count frames, those of the shared row once per cube."""
     workspace_scan("planar-toy", tmp_path / "w.h5")

@@ -101,6 +101,10 @@ class Progress:
         self._samples.append((self._clock(), self._done))
         self.tick()
 
+    def add_rest(self) -> None:
+        """Count the frames that remain as finished, none of them well."""
+        self.add(self._total - self._done, 0)
+
     def tick(self) -> None:
         """Report if it is time to."""
         if self._is_due():

@@ -83,13 +83,13 @@ def connect_survey(
     survey : Survey
     seed : int
     progress : Progress, optional
-        Counts frames as they are reached.
+        Counts frames as they are reached, and at the end those that are not.
     """
     progress = progress or Progress("", quiet=True)
     # Most frames are reached soon, some late and some never.
     progress.begin(len(np.unique(survey.frame)), even=False)
     try:
-        return connect(
+        connection = connect(
             scene.scan_configuration,
             survey.roadmap_goals,
             scene.motions,
@@ -97,8 +97,10 @@ def connect_survey(
             seed=seed,
             on_frame=lambda: progress.add(1, 1),
         )
+        progress.add_rest()
     finally:
         progress.end()
+    return connection
 
 
 def results_of_connection(survey: Survey, connection: Connection) -> FrameResults:
