@@ -125,72 +125,17 @@ class Stages(Protocol):
     """What has to be known before the units of a work; kept in the store, too."""
 
     def run(
-        self,
-        phase: str,
-        job: Job,
-        units: Sequence[Any],
-        *,
-        most: int | None = None,
-        label: str = "",
+        self, phase: str, job: Job, units: Sequence[Any], *, most: int | None = None
     ) -> list[Any]:
-        """Payloads of all units of a job of its own, on at most ``most`` workers.
-
-        The progress report calls it by the label, if one is given, or by the phase.
-        """
+        """Payloads of all units of a job of its own, on at most ``most`` workers."""
 
     def once(
         self,
         phase: str,
         function: Callable[[Progress], Any],
         tally: Callable[[Any], tuple[int, int]] = one_frame,
-        *,
-        label: str = "",
     ) -> Any:
         """Payload of a single unit, computed by this process."""
-
-
-@dataclass(frozen=True, slots=True)
-class StagesOfPart:
-    """Stages of one part of a work, told from those of the others.
-
-    Attributes
-    ----------
-    stages : Stages
-    suffix, note : str
-        What is added to the name of a phase in the store, and in the progress report.
-    """
-
-    stages: Stages
-    suffix: str
-    note: str
-
-    def run(
-        self,
-        phase: str,
-        job: Job,
-        units: Sequence[Any],
-        *,
-        most: int | None = None,
-        label: str = "",
-    ) -> list[Any]:
-        """See :class:`Stages`."""
-        name, label = self._names(phase, label)
-        return self.stages.run(name, job, units, most=most, label=label)
-
-    def once(
-        self,
-        phase: str,
-        function: Callable[[Progress], Any],
-        tally: Callable[[Any], tuple[int, int]] = one_frame,
-        *,
-        label: str = "",
-    ) -> Any:
-        """See :class:`Stages`."""
-        name, label = self._names(phase, label)
-        return self.stages.once(name, function, tally, label=label)
-
-    def _names(self, phase: str, label: str) -> tuple[str, str]:
-        return phase + self.suffix, (label or phase.replace("_", " ")) + self.note
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

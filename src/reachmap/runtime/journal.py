@@ -47,7 +47,7 @@ PREFIX = 9  # eight digits and a space
 SHOWN = 60
 _START = re.compile(rb'[0-9a-f]{8} \{"format":"reachmap\.journal"')
 _RECORD = re.compile(
-    rb'\{"phase":"([a-z_0-9]{1,40})","unit":(\d{1,9}),"ok":(\d{1,18}),"frames":(\d{1,18}),'
+    rb'\{"phase":"([a-z_0-9.%]{1,40})","unit":(\d{1,9}),"ok":(\d{1,18}),"frames":(\d{1,18}),'
     rb'"wall_s":(\d{1,12}\.\d{3}),"cpu_s":(\d{1,12}\.\d{3}),"(result|error)":'
 )
 

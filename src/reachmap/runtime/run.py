@@ -246,19 +246,12 @@ class _Run:
     _pool: Pool | None = field(default=None, init=False)
 
     def run(
-        self,
-        phase: str,
-        job: Job,
-        units: Sequence[Any],
-        *,
-        most: int | None = None,
-        label: str = "",
+        self, phase: str, job: Job, units: Sequence[Any], *, most: int | None = None
     ) -> list[Any]:
         """Payloads of all units of a job of its own, on at most ``most`` workers."""
         self.count_earlier(phase)
         with self.clock.phase(phase):
-            every = dict(enumerate(units))
-            self.complete(phase, job, every, len(units), most=most, label=label)
+            self.complete(phase, job, dict(enumerate(units)), len(units), most)
         for index, text in self.store.failed(phase).items():
             raise _unit_failed(index, text)
         return [self.store.payload(index, phase) for index in range(len(units))]
@@ -268,13 +261,11 @@ class _Run:
         phase: str,
         function: Callable[[Progress], Any],
         tally: Callable[[Any], tuple[int, int]] = one_frame,
-        *,
-        label: str = "",
     ) -> Any:
         """Payload of a single unit, computed by this process."""
         if 0 not in self.store.results(phase):
             with self.clock.phase(phase):
-                payload = function(self.progress(phase, label))
+                payload = function(self.progress(phase))
             ok, frames = tally(payload)
             measure = Measure(ok=ok, frames=frames)
             reply = Reply(index=0, text=encode(payload), measure=measure)
@@ -282,10 +273,12 @@ class _Run:
             self.store.sync()
         return self.store.payload(0, phase)
 
-    def progress(self, phase: str, label: str = "") -> Progress:
+    def progress(self, phase: str) -> Progress:
         """Progress report of a phase, under the label of the work."""
-        named = "" if phase == UNITS else label or phase.replace("_", " ")
-        return Progress(f"{self.label} {named}".strip(), quiet=self.options.quiet)
+        label = (
+            self.label if phase == UNITS else f"{self.label} {phase.replace('_', ' ')}"
+        )
+        return Progress(label, quiet=self.options.quiet)
 
     def count_earlier(self, phase: str) -> None:
         """Add the CPU time of the units that an earlier run computed."""
@@ -298,14 +291,12 @@ class _Run:
         job: Job,
         units: Mapping[int, Any],
         frames: int,
-        *,
         most: int | None = None,
-        label: str = "",
     ) -> None:
         """Compute those of some units that the store does not hold yet."""
         done = self.store.results(phase)
         todo = {index: unit for index, unit in units.items() if index not in done}
-        progress = self.progress(phase, label)
+        progress = self.progress(phase)
         progress.begin(
             frames,
             done=sum(measure.frames for measure in done.values()),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -17,7 +17,8 @@ from reachmap.core.planning.timing import path_length_rad
 from reachmap.core.scene import Scene
 from reachmap.maps import BinMap, RunInfo, Status, write_bin_map
 from reachmap.maps.parts import Components, Refinement
-from reachmap.runtime.job import Job, Kind, Stages, StagesOfPart, Work, blocks
+from reachmap.runtime.job import Job, Kind, Stages, Work, blocks, one_frame
+from reachmap.runtime.progress import Progress
 from reachmap.scans.bin_results import NO_PATH, GraspResults, assemble_bin_map
 from reachmap.scans.bin_roadmap import (
     BinRoadmap,
@@ -67,6 +68,27 @@ class BinContext:
     body_pairs: tuple[str, ...]
     cycles: tuple[CycleKnowledge | None, ...]
     refinement: Refinement | None
+
+
+@dataclass(frozen=True, slots=True)
+class _OneFilling:
+    """Stages of one filling among others, under distinct names."""
+
+    stages: Stages
+    suffix: str
+
+    def run(
+        self, phase: str, job: Job, units: Sequence[Any], *, most: int | None = None
+    ) -> list[Any]:
+        return self.stages.run(phase + self.suffix, job, units, most=most)
+
+    def once(
+        self,
+        phase: str,
+        function: Callable[[Progress], Any],
+        tally: Callable[[Any], tuple[int, int]] = one_frame,
+    ) -> Any:
+        return self.stages.once(phase + self.suffix, function, tally)
 
 
 def bin_work(scene: Scene, document: Mapping[str, Any]) -> Work:
@@ -126,15 +148,19 @@ def pairs_of_fillings(loaded: LoadedCell) -> list[str]:
     return list(found)
 
 
+def _fill_percent(filling: LoadedCell) -> float:
+    """How full the bin is [percent of its depth]."""
+    cell = filling.cell
+    return 100.0 * cell.bin_scan.layers[0] / cell.bin.inner[2]
+
+
 def planning_job(scene: Scene, body_pairs: tuple[str, ...], stages: Stages) -> Job:
     """Survey the test grasps and connect them; what is left is to plan to each."""
     fillings = scene.loaded.fillings()
     known, cycles = [], []
-    for k, filling in enumerate(fillings):
-        cell = filling.cell
-        percent = 100.0 * cell.bin_scan.layers[0] / cell.bin.inner[2]
-        level = StagesOfPart(stages, f"_fill_{k}", f" at {percent:.3g}% fill")
-        one = stages if len(fillings) == 1 else level
+    for filling in fillings:
+        suffix = f"_at_{_fill_percent(filling):.6g}%_fill"
+        one = stages if len(fillings) == 1 else _OneFilling(stages, suffix)
         way_in = connected_grasps(Scene.shared(filling, with_bin=True), one)
         known.append(way_in)
         cycles.append(whole_cycles(filling, way_in, body_pairs, one))

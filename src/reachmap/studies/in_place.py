@@ -32,13 +32,7 @@ class _InPlace:
         self._so_far = hashlib.sha256(f"{work.kind.name} {known}".encode())
 
     def run(
-        self,
-        phase: str,
-        job: Job,
-        units: Sequence[Any],
-        *,
-        most: int | None = None,
-        label: str = "",
+        self, phase: str, job: Job, units: Sequence[Any], *, most: int | None = None
     ) -> list[Any]:
         """Payloads of all units of a job."""
         state = job.prepare(job.context)
@@ -54,8 +48,6 @@ class _InPlace:
         phase: str,
         function: Callable[[Progress], Any],
         tally: Callable[[Any], tuple[int, int]] = one_frame,
-        *,
-        label: str = "",
     ) -> Any:
         """Payload of a single unit."""
         text = self._text(phase, lambda: function(Progress(phase, quiet=True)))
