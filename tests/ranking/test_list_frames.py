@@ -86,6 +86,17 @@ def test_a_frame_pose_stands_for_an_unknown_frame():
             pose_from_numbers(numbers)
 
 
+def test_a_pose_that_contradicts_the_name_of_a_frame_is_refused():
+    """A list of the bin frame is not moved to where a camera is."""
+    pose = transform_from_parts(np.eye(3), POINT)
+    for frame in ("bin", "robot_base", "world"):
+        with pytest.raises(GraspListError, match=f"'{frame}' is known to the map's"):
+            place_grasps(grasp_list(frame), FRAMES, "+z", pose)
+        same = place_grasps(grasp_list(frame), FRAMES, "+z", FRAMES[frame])
+        named = place_grasps(grasp_list(frame), FRAMES, "+z")
+        np.testing.assert_allclose(same.points, named.points)
+
+
 def test_grasps_move_with_the_bin():
     """With a bin_pose a grasp keeps its place in the bin, whatever its frame."""
     T_frame_bin = transform_from_parts(

@@ -236,6 +236,19 @@ def test_an_imported_list_comes_out_in_the_native_format(folder):
         assert one["reachmap"]["cost"] == pytest.approx(other["reachmap"]["cost"])
 
 
+def test_a_camera_list_is_ranked_with_the_pose_of_its_frame(folder):
+    """As the page on grasp lists shows; the answer names the frame of the list."""
+    data = json.loads((folder / "pile-1.json").read_text())
+    (folder / "camera.json").write_text(json.dumps({**data, "frame": "camera"}))
+    pose = (0.5, 0.1, -0.05, np.cos(0.15), 0, 0, np.sin(0.15))
+    posed = ranked("camera.json", "--frame-pose", *pose)
+    assert posed["frame"] == "camera"
+    native = ranked("pile-1.json")["grasps"]
+    for one, other in zip(posed["grasps"], native, strict=True):
+        assert one["id"] == other["id"]
+        assert one["reachmap"]["cost"] == pytest.approx(other["reachmap"]["cost"])
+
+
 def test_the_story_of_a_reachable_grasp(folder):
     """Rank before and after, test grasp, distances, attempts, terms, ties."""
     grasp = ranked("pile-1.json")["grasps"][4]

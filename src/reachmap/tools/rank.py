@@ -252,14 +252,11 @@ def _check_cell(
 
 def read_list(source: str | Path, list_format: ListFormat) -> GraspList:
     """Read a grasp list; suspicious things are logged."""
-    # With a pose the frame needs no name that the cell knows.
-    frame = list_format.frame
-    if frame is None and list_format.frame_pose is not None:
-        frame = "given"
     grasps = read_grasps(
         source,
         source_format=list_format.name,
-        frame=frame,
+        frame=list_format.frame,
+        frame_is_posed=list_format.frame_pose is not None,
         approach_axis=list_format.approach_axis,
         invalid=list_format.invalid,
     )

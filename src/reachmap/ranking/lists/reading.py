@@ -38,6 +38,8 @@ STDIN: Final = "-"
 MAX_BYTES: Final = 32 * 2**20
 
 NATIVE: Final = "reachmap"
+UNNAMED: Final = "given"
+"""Frame of an imported list whose pose is known and whose name is not."""
 
 _ARRAYS: Final[Mapping[str, Callable[..., dict[str, Any]]]] = {
     "graspnet": document_from_graspnet,
@@ -54,6 +56,7 @@ def read_grasps(
     *,
     source_format: str | None = None,
     frame: str | None = None,
+    frame_is_posed: bool = False,
     approach_axis: str | None = None,
     invalid: Invalid = "raise",
 ) -> GraspList:
@@ -67,6 +70,9 @@ def read_grasps(
         One of :data:`FORMATS`; the content decides by default.
     frame : str, optional
         Frame of an imported list; native documents name their own.
+    frame_is_posed : bool
+        Whether the pose of that frame is known apart from the list: it needs no name
+        then, and is called ``given``.
     approach_axis : str, optional
         Approach axis of an imported list's orientations, instead of its format's.
     invalid : {"raise", "mark"}
@@ -89,6 +95,7 @@ def read_grasps(
     if name == NATIVE:
         _refuse_overrides(document, frame, approach_axis, source)
     else:
+        frame = frame or (UNNAMED if frame_is_posed else None)
         document = _imported(document, name, source, frame, approach_axis)
     return grasps_from_document(
         document, source=source, text=text, notes=notes, invalid=invalid

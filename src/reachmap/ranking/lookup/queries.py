@@ -119,6 +119,13 @@ def _frame_pose(
             )
         return frames["bin"] @ inverse_transform(grasps.T_frame_bin)
     if T_base_frame is not None:
+        known_pose = frames.get(grasps.frame, T_base_frame)
+        if not np.allclose(known_pose, T_base_frame, atol=1e-6):
+            raise GraspListError(
+                f"{grasps.source}: frame: {grasps.frame!a} is known to the map's cell, "
+                "and the pose that is given for it is another; give the list the name "
+                "of the frame that it is in"
+            )
         return T_base_frame
     if grasps.frame not in frames:
         known = ", ".join(sorted(frames))
