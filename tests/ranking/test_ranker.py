@@ -27,7 +27,7 @@ from reachmap.ranking import (
     align,
     rotation_between,
 )
-from reachmap.ranking.lookup.costs import outside_map, stable_order
+from reachmap.ranking.lookup.costs import INVALID, outside_map, stable_order
 from reachmap.ranking.lookup.queries import tcp_rotation
 from reachmap.ranking.lookup.settings import Roll
 from reachmap.ranking.lookup.table import quaternion_angle
@@ -387,6 +387,28 @@ def test_a_map_without_a_reachable_test_grasp():
     assert ranking.order.tolist() == list(range(35))
 
 
+def test_only_what_a_direction_points_to_counts():
+    """Of any length, but not one that is 0 with rounding."""
+    points = BIN_MAP.position.reshape(-1, 3)[:4]
+    v = np.tile([0.1, -0.2, -1.0], (4, 1))
+    plain = RANKER.rank(points, v)
+    for length in (1e-5, 1e3, 1e200, 1e308):
+        scaled = RANKER.rank(points, length * v)
+        np.testing.assert_allclose(scaled.cost, plain.cost)
+        np.testing.assert_allclose(scaled.angle, plain.angle, atol=1e-9)
+    nothing = RANKER.rank(points, 1e-12 * v)
+    assert (nothing.status == INVALID).all()
+
+
+def test_what_is_masked_or_none_is_no_number():
+    """As in the images of depth cameras, and in columns of tables."""
+    points = BIN_MAP.position.reshape(-1, 3)[:3]
+    v = np.tile([0, 0, -1.0], (3, 1))
+    masked = np.ma.masked_array(points, mask=np.eye(3) * [[1], [0], [0]] > 0)
+    ranking = RANKER.rank(masked, v, scores=np.array([None, 1, 2], object))
+    assert (ranking.status == INVALID).tolist() == [True, False, False]
+
+
 def test_no_grasps():
     """An empty list has an empty ranking."""
     ranking = RANKER.rank(np.zeros((0, 3)), np.zeros((0, 3)), neighbours=3)
@@ -450,7 +472,17 @@ def test_a_list_ranks_as_its_grasps_do_alone(seed):
         ({"weights": (0.0, 0.0, 0.0)}, "one weight at least"),
         ({"weights": (1.0, 1.0)}, "three weights are needed"),
         ({"likeness": np.inf}, "weight likeness"),
+        ({"weights": "abc"}, "weight alpha must be between 0"),
+        ({"weights": 1.0}, "three weights are needed"),
+        ({"likeness": None}, "weight likeness"),
+        ({"margins": ["clearance"]}, "margins are weights by name"),
+        ({"margins": {1: 1.0, "x": 1.0}}, r"got \[1, 'x'\]"),
+        ({"max_angle_deg": "5"}, "max_angle_deg must be above 0"),
+        ({"scores": [1.0]}, r"scores must have the shape \(2,\)"),
+        ({"scores": ["a", "b"]}, "scores must be an array of numbers"),
+        ({"points": np.zeros((2, 3)) * 1j}, "points must be an array of numbers"),
         ({"neighbours": 0}, "neighbours must be 1 to"),
+        ({"neighbours": 2.5}, "neighbours must be 1 to"),
         ({"roll": "loose"}, "roll must be one of"),
     ],
 )

@@ -30,6 +30,7 @@ from reachmap.geometry import (
 )
 from reachmap.maps.records import BinMap
 from reachmap.ranking.lists.arrays import GraspList
+from reachmap.ranking.lists.fields import MIN_DIRECTION
 from reachmap.ranking.lookup.matching import Queries
 from reachmap.ranking.lookup.settings import Invalid, Roll
 from reachmap.ranking.lookup.table import GraspTable
@@ -246,7 +247,7 @@ def queries_from_arrays(
     points : array_like, shape (n, 3)
         Grasp points [m]; a single one may be flat, an empty list has none.
     directions : array_like, shape (n, 3), optional
-        Approach directions into the object; their length does not matter.
+        Approach directions into the object, of any length but 0.
     rotations : array_like, shape (n, 3, 3), optional
         TCP orientations, of which the nearest rotations are taken. A row of NaN has
         none; its direction counts then.
@@ -274,7 +275,7 @@ def queries_from_arrays(
         R = _rows(rotations, "rotations", (3, 3), n)
         has_rotation = np.logical_not(np.isnan(R).all(axis=(1, 2)))
         known, R = _as_rotations(R)
-        axes = np.where(known[:, None], R @ axis_vector(table.approach_axis), np.nan)
+        axes[known] = approach_directions(R[known], table.approach_axis)
     if directions is not None:
         given = _unit(_rows(directions, "directions", (3,), n))
         axes = np.where(has_rotation[:, None], axes, given)
@@ -321,10 +322,7 @@ def _rows(
     value: ArrayLike, name: str, row: tuple[int, ...], n: int | None
 ) -> FloatArray:
     """Array of n rows; one alone may lack its first axis, an empty one its second."""
-    try:
-        array = np.asarray(value, dtype=float)
-    except (TypeError, ValueError):
-        raise SettingsError(f"{name} must be an array of numbers") from None
+    array = _numbers(value, name)
     if array.size == 0 and len(array.shape) <= 1:
         array = array.reshape(0, *row)
     if array.shape == row:
@@ -332,6 +330,27 @@ def _rows(
     if array.shape[1:] != row or array.ndim == 0 or (n is not None and len(array) != n):
         wanted = ("n" if n is None else n, *row)
         raise SettingsError(f"{name} must have the shape {wanted} (got {array.shape})")
+    return array
+
+
+def _numbers(value: ArrayLike, name: str) -> FloatArray:
+    """Array of numbers; NaN where one is masked or None."""
+    try:
+        given: Any = np.ma.asarray(value)
+        how = "unsafe" if given.dtype.kind == "O" else "same_kind"
+        array: FloatArray = given.astype(float, casting=how).filled(np.nan)
+    except (TypeError, ValueError):
+        raise SettingsError(f"{name} must be an array of numbers") from None
+    return array
+
+
+def scores_of(scores: ArrayLike | None, n: int) -> FloatArray | None:
+    """Check scores of n grasps, NaN where one has none; shape (n,)."""
+    if scores is None:
+        return None
+    array = _numbers(scores, "scores")
+    if array.shape != (n,):
+        raise SettingsError(f"scores must have the shape ({n},) (got {array.shape})")
     return array
 
 
@@ -362,9 +381,12 @@ def _filled(rows: FloatArray, value: FloatArray, valid: BoolArray) -> FloatArray
 
 
 def _unit(vectors: FloatArray) -> FloatArray:
-    length = np.linalg.norm(vectors, axis=1, keepdims=True)
-    usable = (length > 0) & np.isfinite(length)
-    return np.asarray(vectors / np.where(usable, length, np.nan))
+    """Vectors of length 1; NaN where one has none, or is 0 but for rounding."""
+    # Scaled first: squares of very large components would overflow.
+    largest = np.abs(vectors).max(axis=1, keepdims=True, initial=0.0)
+    usable = (largest >= MIN_DIRECTION) & np.isfinite(largest)
+    scaled = vectors / np.where(usable, largest, np.nan)
+    return np.asarray(scaled / np.linalg.norm(scaled, axis=1, keepdims=True))
 
 
 def _quaternions(R: FloatArray, free: BoolArray) -> FloatArray:

@@ -49,6 +49,7 @@ from reachmap.ranking.lookup.queries import (
     frames_of,
     queries_from_arrays,
     rotations_from_quaternions,
+    scores_of,
 )
 from reachmap.ranking.lookup.settings import (
     EVEN,
@@ -168,7 +169,7 @@ class Ranker:
         points : array_like, shape (n, 3)
             Grasp points [m]; one grasp may be flat, and there may be none.
         directions : array_like, shape (n, 3), optional
-            Approach directions into the object; their length does not matter.
+            Approach directions into the object, of any length but 0.
         rotations : array_like, shape (n, 3, 3), optional
             TCP orientations. A row of NaN has none; its direction counts then.
         quaternions_wxyz, quaternions_xyzw : array_like, shape (n, 4), optional
@@ -205,9 +206,9 @@ class Ranker:
         settings = RankSettings(
             cost=cost,
             failure_cost_s=failure_cost_s,
-            weights=tuple(weights),  # type: ignore[arg-type]
+            weights=weights,  # type: ignore[arg-type]
             likeness=likeness,
-            margins=dict(margins or {}),
+            margins={} if margins is None else margins,
             neighbours=neighbours,
             roll=roll,
             max_angle_deg=max_angle_deg,
@@ -266,7 +267,7 @@ class Ranker:
         status = np.where(queries.valid, status, np.uint8(INVALID))
         valid = queries.valid
         return Ranking(
-            order=stable_order(cost, scores),
+            order=stable_order(cost, scores_of(scores, len(queries))),
             cost=cost,
             terms=np.where(reachable[:, None], terms, np.nan),
             term_names=names,

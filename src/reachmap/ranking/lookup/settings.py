@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Final, Literal, TypeAlias
+from numbers import Integral, Real
+from typing import Any, Final, Literal, TypeAlias
 
 from reachmap.errors import SettingsError
 
@@ -107,31 +108,35 @@ class RankSettings:
     invalid: Invalid = "mark"
 
     def __post_init__(self) -> None:
-        if len(self.weights) != 3:
-            raise SettingsError(f"three weights are needed (got {len(self.weights)})")
-        named = zip(("alpha", "beta", "delta"), self.weights, strict=True)
+        weights, margins = _items(self.weights), self.margins
+        if len(weights) != 3:
+            raise SettingsError(f"three weights are needed (got {self.weights!r:.80})")
+        if not _is_mapping(margins):
+            raise SettingsError(f"margins are weights by name (got {margins!r:.80})")
+        named = zip(("alpha", "beta", "delta"), weights, strict=True)
         problems = [_weight_problem(name, value) for name, value in named]
         problems.append(_weight_problem("likeness", self.likeness))
-        problems += [_weight_problem(*item) for item in self.margins.items()]
-        if unknown := sorted(set(self.margins) - set(MARGINS)):
+        problems += [_weight_problem(*item) for item in margins.items()]
+        if unknown := [name for name in margins if name not in MARGINS]:
             problems.append(f"margins are {', '.join(MARGINS)} (got {unknown})")
-        if not 1 <= self.neighbours <= MAX_NEIGHBOURS:
+        if not (_is_whole(self.neighbours) and 1 <= self.neighbours <= MAX_NEIGHBOURS):
             problems.append(
-                f"neighbours must be 1 to {MAX_NEIGHBOURS} (got {self.neighbours})"
+                f"neighbours must be 1 to {MAX_NEIGHBOURS} (got {self.neighbours!r})"
             )
         if self.roll not in ROLLS:
             problems.append(f"roll must be one of {', '.join(ROLLS)} ({self.roll!r})")
         if self.invalid not in INVALIDS:
             problems.append(f"invalid must be mark or raise (got {self.invalid!r})")
         limit = self.max_angle_deg
-        if limit is not None and not 0 < limit <= 180:
-            problems.append(f"max_angle_deg must be above 0, to 180 (got {limit:g})")
-        if not any((*self.weights, self.likeness, *self.margins.values())):
+        if limit is not None and not 0 < _real(limit) <= 180:
+            problems.append(f"max_angle_deg must be above 0, to 180 (got {limit!r})")
+        if not any((*weights, self.likeness, *margins.values())):
             problems.append("one weight at least must be above 0")
         problems += self._cost_problems()
         mistakes = [problem for problem in problems if problem]
         if mistakes:
             raise SettingsError(mistakes)
+        object.__setattr__(self, "weights", tuple(map(float, weights)))
 
     def _cost_problems(self) -> list[str]:
         """Settings that contradict the requested cost."""
@@ -142,18 +147,36 @@ class RankSettings:
             return ["failure_cost_s needs cost cycle"] if failure_s is not None else []
         problems = []
         weighed = any((self.likeness, *self.margins.values()))
-        if weighed or self.weights != EVEN:
+        if weighed or _items(self.weights) != EVEN:
             problems.append("cost cycle is in seconds: weights belong to cost paper")
-        if self.neighbours > 1:
+        if self.neighbours != 1:
             problems.append("cost cycle is of the nearest test grasp: neighbours is 1")
-        if failure_s is not None and not 0 <= failure_s <= MAX_FAILURE_S:
+        if failure_s is not None and not 0 <= _real(failure_s) <= MAX_FAILURE_S:
             problems.append(
-                f"failure_cost_s must be 0 to {MAX_FAILURE_S:g} (got {failure_s:g})"
+                f"failure_cost_s must be 0 to {MAX_FAILURE_S:g} (got {failure_s!r})"
             )
         return problems
 
 
-def _weight_problem(name: str, value: float) -> str:
-    if math.isfinite(value) and 0 <= value <= MAX_WEIGHT:
+def _weight_problem(name: object, value: object) -> str:
+    if 0 <= _real(value) <= MAX_WEIGHT:
         return ""
-    return f"weight {name} must be between 0 and {MAX_WEIGHT:g} (got {value:g})"
+    return f"weight {name} must be between 0 and {MAX_WEIGHT:g} (got {value!r})"
+
+
+def _real(value: object) -> float:
+    """Value of a number, NaN for what is none."""
+    return float(value) if isinstance(value, Real) else math.nan
+
+
+def _is_whole(value: object) -> bool:
+    return isinstance(value, Integral)
+
+
+def _is_mapping(value: object) -> bool:
+    return isinstance(value, Mapping)
+
+
+def _items(value: object) -> tuple[Any, ...]:
+    """Items of a sequence, none of what is not one."""
+    return tuple(value) if isinstance(value, Iterable) else ()
