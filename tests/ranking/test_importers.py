@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import io
 import json
 import time
@@ -33,6 +34,11 @@ def graspnet_rows(n=3, dtype=np.float32):
     """Rows of 17 columns: score, width, height, depth, R by rows, t, object."""
     row = [0.9, 0.06, 0.02, 0.03, *R.ravel(), 0.1, 0.2, 0.3, 7]
     return np.tile(np.array(row, dtype), (n, 1))
+
+
+def suction_rows(n=3):
+    """Rows of 7 columns: score, unit normal, point."""
+    return np.tile([0.9, 0.0, 0.6, 0.8, 0.1, -0.2, 0.05], (n, 1))
 
 
 def saved(path, array, **how):
@@ -225,6 +231,40 @@ def test_rows_that_are_not_finite(tmp_path):
     rows[1, 4] = np.nan
     with pytest.raises(GraspListError, match="the first is row 1"):
         read_grasps(saved(tmp_path / "g.npy", rows), frame="bin")
+
+
+@pytest.mark.parametrize("rows_of", [graspnet_rows, suction_rows])
+def test_a_row_of_nan_does_not_lose_the_others(tmp_path, rows_of):
+    """Asked for, it is an invalid grasp, its score and all."""
+    rows = np.array(rows_of(), float)
+    whole = read_grasps(saved(tmp_path / "w.npy", rows), frame="bin")
+    rows[1] = np.nan
+    path = saved(tmp_path / "g.npy", rows)
+    marked = read_grasps(path, frame="bin", invalid="mark")
+    others = np.arange(len(rows)) != 1
+    np.testing.assert_array_equal(marked.points[others], whole.points[others])
+    np.testing.assert_array_equal(marked.directions[others], whole.directions[others])
+    np.testing.assert_array_equal(marked.scores[others], whole.scores[others])
+    assert np.isnan(marked.points[1]).all()
+    assert np.isnan(marked.scores[1])
+    assert any("grasps[1].position[0]" in line for line in marked.warnings)
+
+
+@pytest.mark.parametrize(
+    ("shape", "name"),
+    [((0,), None), ((0,), "suction"), ((0, 7), None), ((0, 17), None)],
+)
+def test_an_image_without_grasps_is_a_list(tmp_path, shape, name):
+    """Whichever way a program stores that it found nothing."""
+    path = saved(tmp_path / "e.npy", np.zeros(shape))
+    assert len(read_grasps(path, frame="bin", source_format=name)) == 0
+
+
+def test_compressed_lists_are_told_as_such(tmp_path):
+    """With what packs them."""
+    (tmp_path / "g.json.gz").write_bytes(gzip.compress(b"{}"))
+    with pytest.raises(GraspListError, match=r"is compressed \(gzip\); unpack it"):
+        read_grasps(tmp_path / "g.json.gz")
 
 
 @pytest.mark.parametrize(

@@ -17,7 +17,7 @@ from reachmap.geometry import (
 )
 from reachmap.maps.bytes.to_json import json_ready
 from reachmap.ranking.lists.document import LENGTH_UNITS
-from reachmap.ranking.lists.fields import ORIENTATIONS, POSE_KEYS
+from reachmap.ranking.lists.fields import NUMBER_KEYS, ORIENTATIONS
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -114,9 +114,9 @@ def arrays_from_document(
 
 
 def _without_pose(grasp: Mapping[str, Any]) -> dict[str, Any]:
-    """An invalid grasp: NaN for its position and direction."""
+    """An invalid grasp: NaN for its position and direction, and no score."""
     nowhere = 3 * [np.nan]
-    rest = {key: value for key, value in grasp.items() if key not in POSE_KEYS}
+    rest = {key: value for key, value in grasp.items() if key not in NUMBER_KEYS}
     return {**rest, "position": nowhere, "direction": nowhere}
 
 

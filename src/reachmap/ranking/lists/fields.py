@@ -23,6 +23,7 @@ ORIENTATIONS: Final = (
     "rotation_matrix",
 )
 POSE_KEYS: Final = ("position", *ORIENTATIONS)
+NUMBER_KEYS: Final = (*POSE_KEYS, "score", "width", "object_id")
 
 # Published files hold quaternions of length 0.99985 and matrices of three decimals.
 NORM_WARNING: Final = 1e-3

@@ -6,7 +6,7 @@ The format is detected from the content, not from the name.
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any, Final
@@ -15,7 +15,7 @@ from reachmap.disk import recorded_name
 from reachmap.errors import GraspListError, SettingsError
 from reachmap.ranking.lists.arrays import GraspList, arrays_from_document
 from reachmap.ranking.lists.document import FORMAT, check_document
-from reachmap.ranking.lists.fields import POSE_KEYS, shown
+from reachmap.ranking.lists.fields import NUMBER_KEYS, POSE_KEYS, Findings, shown
 from reachmap.ranking.lists.importers.arrays import (
     array_from_npy,
     array_from_npz,
@@ -36,6 +36,14 @@ from reachmap.ranking.lookup.settings import Invalid
 STDIN: Final = "-"
 # A choice against hostile input: room for MAX_GRASPS at 330 bytes each.
 MAX_BYTES: Final = 32 * 2**20
+
+COMPRESSED: Final = {
+    b"\x1f\x8b": "gzip",
+    b"BZh": "bzip2",
+    b"\xfd7zXZ": "xz",
+    b"\x28\xb5\x2f\xfd": "zstd",
+}
+"""First bytes of files to the program that packs them."""
 
 NATIVE: Final = "reachmap"
 UNNAMED: Final = "given"
@@ -131,19 +139,26 @@ def grasps_from_document(
         Every mistake on a line of its own.
     """
     found = check_document(document)
-    bad = [one for one in found.mistakes if invalid == "mark" and _is_of_a_pose(one[0])]
+    rows = _without_a_pose(found) if invalid == "mark" else None
+    bad = [one for one in found.mistakes if _is_of_a_row(one[0], rows or ())]
     if len(bad) < len(found.mistakes):
         raise GraspListError(limited(_located(found.mistakes, source, text)))
     located = limited(_located([*bad, *found.warnings], source, text))
     prefix = f"{source}: "
     warnings = [*(prefix + note for note in notes), *located]
-    rows = {path[1] for path, _ in bad} if invalid == "mark" else None
     return arrays_from_document(_without_results(document), source, warnings, rows)
 
 
-def _is_of_a_pose(path: JsonPath) -> bool:
-    """Whether a mistake is in the numbers of a grasp, which makes it invalid."""
-    return path[:1] == ("grasps",) and len(path) > 2 and path[2] in POSE_KEYS
+def _without_a_pose(found: Findings) -> set[str | int]:
+    """Grasps whose position or orientation is none, which makes them invalid."""
+    places = [path for path, _ in found.mistakes if path[:1] == ("grasps",)]
+    return {path[1] for path in places if len(path) > 2 and path[2] in POSE_KEYS}
+
+
+def _is_of_a_row(path: JsonPath, rows: Collection[str | int]) -> bool:
+    """Whether a mistake is in the numbers of one of some grasps."""
+    at = path[:1] == ("grasps",) and len(path) > 2 and path[1] in rows
+    return at and path[2] in NUMBER_KEYS
 
 
 def _read_bytes(path: str | Path, source: str) -> bytes:
@@ -235,7 +250,7 @@ def document_from_bytes(
     name : str, optional
         One of :data:`FORMATS`; by default the content decides.
     finite : bool
-        Whether NaN in a JSON text is refused.
+        Whether NaN in a JSON text or in an array is refused.
 
     Returns
     -------
@@ -250,7 +265,7 @@ def document_from_bytes(
     if not data.strip():
         raise GraspListError(f"{source}: the file is empty")
     if data.startswith((b"\x93NUMPY", b"PK\x03\x04")):
-        return _from_array(data, source, name)
+        return _from_array(data, source, name, finite=finite)
     text = _text(data, source)
     is_json = text.lstrip().startswith(("{", "["))
     content = (
@@ -270,10 +285,10 @@ def document_from_bytes(
 
 
 def _from_array(
-    data: bytes, source: str, name: str | None
+    data: bytes, source: str, name: str | None, *, finite: bool
 ) -> tuple[Any, str, str, list[str]]:
     read = array_from_npy if data.startswith(b"\x93") else array_from_npz
-    rows = read(data, source)
+    rows = read(data, source, finite=finite)
     name = name or ("graspnet" if rows.shape[1] == 17 else "suction")
     if name not in _ARRAYS:
         raise GraspListError(f"{source}: an array cannot be of the format {name}")
@@ -281,6 +296,9 @@ def _from_array(
 
 
 def _text(data: bytes, source: str) -> str:
+    for magic, packer in COMPRESSED.items():
+        if data.startswith(magic):
+            raise GraspListError(f"{source}: is compressed ({packer}); unpack it first")
     if data.startswith(b"\x89HDF"):
         raise GraspListError(
             f"{source}: this is an HDF5 file, a map perhaps; not grasps"

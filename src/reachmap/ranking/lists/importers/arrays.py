@@ -26,7 +26,7 @@ SUCTION_COLUMNS: Final = 7
 MAX_VALUE: Final = 1e9
 
 
-def array_from_npy(data: bytes, source: str) -> FloatArray:
+def array_from_npy(data: bytes, source: str, *, finite: bool = True) -> FloatArray:
     """Rows of a ``.npy`` file.
 
     Nothing is unpickled, and the size that the header claims is compared with the
@@ -37,11 +37,13 @@ def array_from_npy(data: bytes, source: str) -> FloatArray:
     data : bytes
     source : str
         Name of the file in messages.
+    finite : bool
+        Whether rows with NaN or infinity are refused.
 
     Returns
     -------
     array, shape (n, columns)
-        A single row may be stored flat.
+        A single row may be stored flat, and none without columns.
     """
     stream = io.BytesIO(data)
     try:
@@ -63,10 +65,16 @@ def array_from_npy(data: bytes, source: str) -> FloatArray:
             f"(got {dtype.str!a} {shape} in {len(data)} bytes)"
         )
     rows = np.load(io.BytesIO(data), allow_pickle=False).astype(float)
-    return _checked(np.atleast_2d(rows), source)
+    rows = np.atleast_2d(rows) if rows.size else _without_rows(rows)
+    return _checked(rows, source, finite=finite)
 
 
-def array_from_npz(data: bytes, source: str) -> FloatArray:
+def _without_rows(rows: FloatArray) -> FloatArray:
+    """No rows: an image in which a network found nothing is stored as ``(0,)``."""
+    return rows.reshape(0, GRASPNET_COLUMNS) if rows.shape == (0,) else rows
+
+
+def array_from_npz(data: bytes, source: str, *, finite: bool = True) -> FloatArray:
     """Return the one array with 17 or 7 columns in an ``.npz`` file."""
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
@@ -83,7 +91,9 @@ def array_from_npz(data: bytes, source: str) -> FloatArray:
     mistakes: list[str] = []
     for name, content in contents.items():
         try:
-            found[name] = array_from_npy(content, f"{source}, array {name!a}")
+            found[name] = array_from_npy(
+                content, f"{source}, array {name!a}", finite=finite
+            )
         except GraspListError as error:
             mistakes += error.lines
     if len(found) == 1:
@@ -96,7 +106,7 @@ def array_from_npz(data: bytes, source: str) -> FloatArray:
     )
 
 
-def _checked(rows: FloatArray, source: str) -> FloatArray:
+def _checked(rows: FloatArray, source: str, *, finite: bool) -> FloatArray:
     if rows.ndim != 2 or rows.shape[1] not in (GRASPNET_COLUMNS, SUCTION_COLUMNS):
         raise GraspListError(
             f"{source}: expected {GRASPNET_COLUMNS} columns (GraspNet) or "
@@ -106,7 +116,7 @@ def _checked(rows: FloatArray, source: str) -> FloatArray:
         raise GraspListError(f"{source}: {len(rows)} rows; the limit is {MAX_GRASPS}")
     # The comparison is false for NaN as well.
     bad = np.flatnonzero(~(np.abs(rows) < MAX_VALUE).all(axis=1))
-    if bad.size:
+    if bad.size and finite:
         raise GraspListError(
             f"{source}: {bad.size} rows hold NaN, infinity or numbers beyond "
             f"{MAX_VALUE:g}; the first is row {bad[0]}"
@@ -122,7 +132,7 @@ def document_from_graspnet(rows: FloatArray, source: str) -> dict[str, Any]:
     matrix; the position is the grasp centre, from which the fingers reach ``depth``
     further along the approach.
     """
-    if rows.shape[1] != GRASPNET_COLUMNS:
+    if len(rows) and rows.shape[1] != GRASPNET_COLUMNS:
         raise GraspListError(f"{source}: GraspNet has 17 columns (got {rows.shape[1]})")
     grasps = [
         {
@@ -130,7 +140,7 @@ def document_from_graspnet(rows: FloatArray, source: str) -> dict[str, Any]:
             "rotation_matrix": [row[4:7], row[7:10], row[10:13]],
             "score": row[0],
             "width": row[1],
-            "object_id": int(row[16]),
+            "object_id": int(row[16]) if math.isfinite(row[16]) else row[16],
             "x_height": row[2],
             "x_depth": row[3],
         }
@@ -154,6 +164,8 @@ def document_from_suction(
     source : str
     order : {"auto", "normal-first", "point-first"}
     """
+    if not len(rows):
+        return {"direction_convention": "outward_normal", "grasps": []}
     if rows.shape[1] != SUCTION_COLUMNS:
         raise GraspListError(f"{source}: suction has 7 columns (got {rows.shape[1]})")
     first, second = rows[:, 1:4], rows[:, 4:7]
@@ -170,9 +182,10 @@ def document_from_suction(
 
 
 def _suction_order(first: FloatArray, second: FloatArray, source: str) -> str:
+    known = np.isfinite(np.hstack([first, second])).all(axis=1)
     unit = [
-        bool(np.all(np.abs(np.linalg.norm(triple, axis=1) - 1.0) < UNIT_TOLERANCE))
-        for triple in (first, second)
+        bool(np.all(np.abs(np.linalg.norm(rows, axis=1) - 1.0) < UNIT_TOLERANCE))
+        for rows in (first[known], second[known])
     ]
     if unit[0] != unit[1]:
         return "normal-first" if unit[0] else "point-first"
