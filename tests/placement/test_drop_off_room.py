@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from reachmap.cell.loading import read_cell
 from reachmap.core.scene import Scene
 from reachmap.geometry import yaw_transform
 from reachmap.placement.drop_off_room import DropOffRoom
@@ -65,6 +66,26 @@ def test_every_drop_off_counts_but_those_in_the_bin():
     room = room_at(f"{{name: rest, q_rad: {{{joints}}}}}")
     assert room.taken(yaw_transform(x, y, z - 0.05, 0.0)) == "rest"
     assert room.taken(yaw_transform(x, y + 0.8, z - 0.05, 0.0)) == ""
+
+
+def test_a_drop_off_in_a_bin_that_is_not_there_yet_has_no_place(tmp_path):
+    """Once that bin stands, others leave its drop-off room wherever that is."""
+    other = "{inner: [0.3, 0.2, 0.1], pose: {xyz: [0.5, 0.5, 0.0]}}"
+    text = read_cell("ur5-eye-in-hand").text
+    head, rest = text.split("\nbin:\n")
+    rest = rest[rest.index("\nscan_configuration:") :]
+    bins = f"bins:\n  full: {other.replace('0.5, 0.5', '0.5, -0.2')}\n  goal: {other}"
+    (tmp_path / "two.yaml").write_text(f"{head}\n{bins}{rest}")
+    inside = "{frame: goal, pose: {xyz: [0, 0, 0.07], " + DOWN + "}}"
+    loaded = read_cell(str(tmp_path / "two.yaml"), [PART, f"drop_off={inside}"])
+    alone, both = (
+        DropOffRoom(Scene.build(beside, with_bin=False))
+        for beside in (loaded.with_other_bins({}), loaded)
+    )
+    for x, y in ((0.5, 0.5), (0.5, -0.5)):
+        assert alone.taken(yaw_transform(x, y, 0.0, 0.0)) == ""
+    assert both.taken(yaw_transform(0.5, 0.5, 0.0, 0.0)) == "drop-off"
+    assert both.taken(yaw_transform(0.5, -0.5, 0.0, 0.0)) == ""
 
 
 @pytest.mark.parametrize("angle_deg", [0.0, 37.0, 90.0])

@@ -17,7 +17,8 @@ class DropOffRoom:
 
     A bin leaves room where the tool can be at each drop-off, and where its straight
     approach begins, in one of the equivalent poses. The arm is left out: how it gets
-    there is for the cycle to say. A drop-off in the bin itself moves with it.
+    there is for the cycle to say. A drop-off in the bin itself moves with it, and one
+    in a bin that is not there yet has no place.
 
     Parameters
     ----------
@@ -28,10 +29,11 @@ class DropOffRoom:
     def __init__(self, scene: Scene) -> None:
         cell = scene.loaded.cell
         self._tool = ToolFit(scene.robot, scene.loaded, load="carried", whole=True)
+        still = {"world", "robot_base", *cell.bins, *(b.name for b in cell.bodies)}
         self._poses = {
             spec.name: _poses(scene, spec)
             for spec in cell.drop_offs
-            if spec.pose is None or spec.frame not in ("bin", cell.bin.name)
+            if spec.pose is None or spec.frame in still
         }
 
     def taken(self, T_base_bin: FloatArray) -> str:
