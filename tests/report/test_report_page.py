@@ -9,16 +9,21 @@ import shutil
 from html.parser import HTMLParser
 from pathlib import Path
 
+import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 
 from reachmap.cli import group
-from reachmap.maps import write_bin_map, write_workspace_map
+from reachmap.maps import write_bin_map, write_placement, write_workspace_map
 from reachmap.maps.study.format import read_study
 from reachmap.maps.study.words import sentence
 from reachmap.maps.summary.statistics import saturation_of
 from reachmap.report.page import CONTENTS
-from tests.support.synthetic_maps import synthetic_bin_map, synthetic_provenance
+from tests.support.synthetic_maps import (
+    synthetic_bin_map,
+    synthetic_placement,
+    synthetic_provenance,
+)
 from tests.support.toy_artefacts import toy_bin_map, toy_workspace
 
 DRAWINGS = {
@@ -163,6 +168,26 @@ def test_the_answers_are_those_of_the_maps(
     assert "80 mm off before" in text
     best = json.loads((finished_run / "ranked.json").read_text())["grasps"][0]
     assert best["id"] in text
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_a_bin_on_a_table_may_be_off_in_the_plane(tmp_path: Path) -> None:
+    """It cannot sink into the table, and its place is in the frame of the levels."""
+    folder = tmp_path / "run"
+    folder.mkdir()
+    margin = {"+x": 0.12, "-x": 0.08, "+z": 0.1, "-z": 0.0, "+yaw": 0.4}
+    hung = np.diag([1.0, -1.0, -1.0, 1.0])
+    placed = synthetic_placement(margin=margin, T_world_base=hung, T_base_level=hung)
+    bin_pose = hung @ placed.bin_pose
+    for support, room_mm in (("table", 80), ("", 0)):
+        write_placement(
+            folder / "placement.h5",
+            dataclasses.replace(placed, bin_pose=bin_pose, support=support),
+            overwrite=True,
+        )
+        text = Outline(page_of(folder, tmp_path, f"{room_mm}.html")).text
+        assert f"It may be {room_mm} mm off before" in text
+        assert "Metres in world, turned by" in text
 
 
 def test_the_validation_is_reported(finished_page: str) -> None:

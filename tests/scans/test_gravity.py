@@ -19,6 +19,8 @@ from reachmap.geometry import (
 )
 from reachmap.maps import Status, read_workspace_map
 from reachmap.maps.summary.upright import upright_workspace
+from reachmap.plots.heatmap import draw_level
+from reachmap.plots.parts.stack import stack_of
 from reachmap.tools.workspace_scan import workspace_scan
 
 URDF = "package://example-robot-data/robots/ur_description/urdf/ur5_robot.urdf"
@@ -238,6 +240,24 @@ def test_cubes_in_the_world_and_in_robot_base_are_one_map(tmp_path):
     ]
     first, second = compared(home, scanned(path, tmp_path / "b.h5", *in_world))
     np.testing.assert_array_equal(first, second)
+
+
+def test_pictures_name_the_frame_of_their_levels(tmp_path):
+    """Levels that were turned upright are not in robot_base."""
+    path = hanging_cell(tmp_path, CEILING, way="base_pose")
+    (tmp_path / "second").mkdir()
+    without_base_pose = hanging_cell(tmp_path / "second", CEILING, way="base_frame")
+    in_world = "workspace_scan.frame=world", "workspace_scan.cubes.0.grid=[2,2]"
+    for k, (cell, overrides, frame) in enumerate(
+        (
+            (path, (), "robot_base, upright"),
+            (without_base_pose, (), "robot_base, upright"),
+            (path, in_world, "world"),
+            (path, ("robot.base_pose={xyz: [0, 0, 0.8]}",), "robot_base"),
+        )
+    ):
+        stack = stack_of(scanned(cell, tmp_path / f"{k}.h5", *overrides), "path")
+        assert draw_level(stack, 0).axes[0].get_xlabel() == f"x in {frame} [m]"
 
 
 def test_a_bin_that_would_spill_is_refused(tmp_path):

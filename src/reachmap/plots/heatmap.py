@@ -61,7 +61,7 @@ def draw_level(
     mesh = draw_level_on(axes, stack, level, scale_in, percent_map)
     if is_marked(stack, level):
         mark_best(axes, stack, level)
-    axis_titles(axes)
+    axis_titles(axes, stack.frame)
     name = QUANTITY_NAMES[stack.quantity]
     unit = "percentage points" if stack.quantity == "difference" else "%"
     label = f"{name[0].upper()}{name[1:]} [{unit}]"

@@ -133,7 +133,7 @@ def _draw_legend(figure: Figure, stack: LevelStack, width_in: float) -> None:
         bbox_to_anchor=(LEFT / figure.get_figwidth() - 0.005, 0.004),
         ncols=max(1, int(width_in / 1.5)),
         columnspacing=1.6,
-        title="x and y in robot_base [m]; outlines to scale:",
+        title=f"x and y in {stack.frame} [m]; outlines to scale:",
         title_fontproperties={"size": 8},
         alignment="left",
         labelcolor=MUTED,

@@ -14,6 +14,7 @@ from matplotlib.patheffects import withStroke
 
 from reachmap._typing import BoolArray, FloatArray
 from reachmap.maps.records import BinPlacement, WorkspaceMap
+from reachmap.maps.summary.upright import name_of_frame
 from reachmap.plots.parts.context import CellContext, context_of, levels_of
 from reachmap.plots.parts.outlines import (
     Kind,
@@ -117,7 +118,7 @@ def draw_placement(
         axes.set_ylim(low[1], high[1])
         axes.set_aspect("equal")
         axes.tick_params(length=2.5)
-        axis_titles(axes)
+        axis_titles(axes, name_of_frame(placement.T_base_level, placement.T_world_base))
     left = LEFT + (count - 1) * (width + GAP)
     bar = (left + width + 0.15, bottom, 0.16, height)
     colour_bar(figure, marks, bar, "Path reachability, score [%]")
@@ -172,7 +173,6 @@ def _stack(
         values=workspace.path_reachability,
         quantity="path",
         outlines=context.standing,
-        cell_name=context.name,
     )
 
 

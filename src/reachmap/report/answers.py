@@ -83,15 +83,17 @@ def _bin(run: RunFolder) -> Tile:
     lead = ""
     if rival is not None:
         lead = f"The runner-up reaches {percent(rival.score)}."
-    slack = {k: v for k, v in summary.margin.items() if "yaw" not in k}
+    # What the bin stands on holds its height.
+    axes = "xy" if summary.support else "xyz"
+    slack = [v for k, v in summary.margin.items() if k[1:] in axes]
     room = ""
     if slack:
-        room = f"It may be {number(1000 * min(slack.values()), 0)} mm off before "
+        room = f"It may be {number(1000 * min(slack), 0)} mm off before "
         room += "that drops by 5 points."
     return _tile(
         question,
         place,
-        f"Metres from robot_base, turned by {number(chosen.yaw_deg, 0)}°. "
+        f"Metres in {summary.frame}, turned by {number(chosen.yaw_deg, 0)}°. "
         f"{percent(chosen.score)} of the tool orientations in the pick volume. {lead}",
         room,
     )

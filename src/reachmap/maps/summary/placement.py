@@ -9,6 +9,7 @@ import numpy as np
 from reachmap._typing import FloatArray
 from reachmap.maps.format.candidates import excluded_counts, shown_margin
 from reachmap.maps.records import BinPlacement
+from reachmap.maps.summary.upright import name_of_frame
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -50,6 +51,8 @@ class PlacementSummary:
         Standard error of the chosen pose's score [percent].
     support : str or None
         Body that the bin stands on, "" if it stands on none.
+    frame : str
+        Frame that positions and yaws are in.
     """
 
     rule: str
@@ -66,6 +69,7 @@ class PlacementSummary:
     worst_score: float | None
     score_error: float | None
     support: str | None
+    frame: str
 
 
 def summarise_placement(record: BinPlacement) -> PlacementSummary:
@@ -90,6 +94,7 @@ def summarise_placement(record: BinPlacement) -> PlacementSummary:
         worst_score=_of_chosen(record, record.worst_score),
         score_error=_of_chosen(record, record.score_error),
         support=record.support,
+        frame=name_of_frame(record.T_base_level, record.T_world_base),
     )
 
 

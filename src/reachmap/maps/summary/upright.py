@@ -54,6 +54,23 @@ def upright_workspace(record: WorkspaceMap, T_base_level: FloatArray) -> Workspa
     return workspace_map_from_cubes(cubes, **{**rest, "T_base_grid": T_base_level})
 
 
+def name_of_frame(T_base_frame: FloatArray, T_world_base: FloatArray | None) -> str:
+    """Name of the frame that a map's lattice, or a bin's place, is given in.
+
+    Parameters
+    ----------
+    T_base_frame : array, shape (4, 4)
+    T_world_base : array, shape (4, 4), or None
+        None: robot_base is the world.
+    """
+    if np.allclose(T_base_frame, np.eye(4), rtol=0.0, atol=WHOLE):
+        return "robot_base"
+    T_world_base = np.eye(4) if T_world_base is None else T_world_base
+    if np.allclose(T_world_base @ T_base_frame, np.eye(4), rtol=0.0, atol=WHOLE):
+        return "world"
+    return "robot_base, upright"
+
+
 def _turned(cube: CubeMap, axis: IntArray, sign: FloatArray) -> CubeMap:
     """A cube whose k-th coordinate is ``sign[k]`` times its old ``axis[k]``-th."""
     old = [getattr(cube, name) for name in _LATTICE]

@@ -233,7 +233,7 @@ def draw_squares(
     return mesh
 
 
-def axis_titles(axes: Axes, frame: str = "robot_base") -> None:
+def axis_titles(axes: Axes, frame: str) -> None:
     """Name both axes, with unit and frame."""
     axes.set_xlabel(f"x in {frame} [m]")
     axes.set_ylabel(f"y in {frame} [m]")

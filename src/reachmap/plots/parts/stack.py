@@ -10,6 +10,7 @@ from matplotlib.colors import Colormap
 from reachmap._typing import FloatArray
 from reachmap.maps.records import WorkspaceMap
 from reachmap.maps.summary.statistics import best_level, level_means
+from reachmap.maps.summary.upright import name_of_frame
 from reachmap.plots.parts.context import context_of, levels_of, patch_shape
 from reachmap.plots.parts.levels import (
     QUANTITY_NAMES,
@@ -37,7 +38,7 @@ class LevelStack:
     Attributes
     ----------
     x, y, z : array, shape (nx,), (ny,), (nz,)
-        Stitched lattice in robot_base [m].
+        Stitched lattice [m].
     values : array, shape (nz, ny, nx)
         Percent, NaN where nothing was attempted.
     quantity : str
@@ -46,6 +47,8 @@ class LevelStack:
     patch : (int, int)
         Rows and columns of the patch to mark on the best level.
     cell_name : str
+    frame : str
+        Frame that ``x``, ``y`` and ``z`` are in.
     """
 
     x: FloatArray
@@ -56,6 +59,7 @@ class LevelStack:
     outlines: tuple[Outline, ...] = ()
     patch: tuple[int, int] = (3, 3)
     cell_name: str = ""
+    frame: str = "robot_base"
 
     def colours(self, percent_map: PercentMap) -> Colormap:
         """Colour map of the quantity; the difference has one of its own."""
@@ -111,6 +115,7 @@ def stack_of(workspace: WorkspaceMap, quantity: Quantity) -> LevelStack:
         outlines=(*context.standing, *context.bin),
         patch=patch_shape(context.bin, workspace.x, workspace.y),
         cell_name=context.name,
+        frame=name_of_frame(workspace.T_base_grid, workspace.T_world_base),
     )
 
 

@@ -121,7 +121,8 @@ def placement_section(record: BinPlacement, workspace: WorkspaceMap | None) -> S
         paragraph(
             f"Considered: {count(summary.candidates, 'pose')} of the bin, "
             f"{summary.exact} with the bin in the scene (rule: {summary.rule}). The "
-            "score is the mean path reachability over the pick volume."
+            "score is the mean path reachability over the pick volume. Positions are "
+            f"in {summary.frame}."
         ),
         _candidate_table(summary),
         Heading("Margin"),
