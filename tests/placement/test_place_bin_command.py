@@ -392,6 +392,20 @@ def test_two_workers_agree_on_the_shipped_cell(ur5, tmp_path):
     assert len(hashes) == 1
 
 
+@pytest.mark.parametrize(("pitch_deg", "is_said"), [(20, True), (0, False)])
+def test_a_bin_that_leans_is_said_to_be_placed_upright(
+    toy, tmp_path, pitch_deg, is_said
+):
+    """Only x, y, z and yaw are searched, so its lean does not stay."""
+    output = tmp_path / "placement.h5"
+    lean = f"bin.pose={{xyz: [0.3, 0.3, -0.2], rpy_deg: [0, {pitch_deg}, 0]}}"
+    result = place(toy / "workspace.h5", "-o", output, "--set", lean, "--top", "1")
+    assert result.exit_code == 0, result.stderr
+    said = f"the bin leans by {pitch_deg} deg; it is placed upright"
+    assert (said in result.stderr) == is_said
+    np.testing.assert_allclose(read_placement(output).bin_pose[2], [0, 0, 1, -0.2])
+
+
 def test_with_something_to_stand_on_every_pose_stands_on_it(toy, tmp_path):
     """Heights are those of the table, footprints inside it, and its name is stored."""
     bin_spec = read_cell("planar-toy").cell.bin

@@ -10,11 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from reachmap._typing import BoolArray, FloatArray
+from reachmap._typing import BoolArray
 from reachmap.cell.bins.support import TopFace, top_faces
 from reachmap.cell.model.robot import LISTED
 from reachmap.core.collision.bin_fit import BinFit
-from reachmap.core.collision.camera import Camera
 from reachmap.core.scene import Scene
 from reachmap.disk import as_path
 from reachmap.errors import SceneError, SettingsError
@@ -42,7 +41,7 @@ from reachmap.placement.decision import (
 from reachmap.placement.drop_off_room import DropOffRoom
 from reachmap.placement.mapped.evaluator import Evaluator, open_evaluator
 from reachmap.placement.mapped.exact import Pose
-from reachmap.placement.mapped.imaging import can_choose
+from reachmap.placement.mapped.imaging import can_choose, still_camera
 from reachmap.placement.mapped.sample import open_frames
 from reachmap.placement.predicted.region import AXES, Region, region_of
 from reachmap.placement.problem import PlacementProblem
@@ -60,7 +59,12 @@ from reachmap.scans.document import (
     scan_document,
 )
 from reachmap.tools.placement_picture import draw_placed
-from reachmap.tools.prologue import check_places, refuse_cell_files, with_seed
+from reachmap.tools.prologue import (
+    check_places,
+    refuse_cell_files,
+    warn_of_lean,
+    with_seed,
+)
 
 if TYPE_CHECKING:
     from reachmap.cell.loading import LoadedCell
@@ -168,6 +172,7 @@ def place_bin(
         workspace_map.provenance, str(workspace), with_seed(overrides, seed)
     )
     refuse_cell_files([output, picture], loaded)
+    warn_of_lean(loaded)
     placed = placed_bin(loaded, workspace_map, choice, run)
     write_placement(output, placed.placement, overwrite=run.overwrite)
     if picture is not None:
@@ -264,7 +269,7 @@ def _problem(
         region=region,
         scene=scene,
         moving=Scene.build(loaded, with_bin=True, bin_moves=True),
-        still_camera=_still_camera(scene),
+        still_camera=still_camera(scene),
         tolerance=_tolerance(loaded, choice, supports),
         faces=faces,
         supports=supports,
@@ -283,14 +288,6 @@ def _tolerance(
     shift_m, turn_deg = choice.tolerance or (given.shift_m, given.turn_deg)
     turn_rad = float(np.radians(turn_deg))
     return Tolerance(shift_m=shift_m, turn_rad=turn_rad, floats=not supports)
-
-
-def _still_camera(scene: Scene) -> FloatArray | None:
-    """Pose of a camera that is not on the tool, in robot_base, or None."""
-    if scene.loaded.cell.camera is None:
-        return None
-    camera = Camera(scene.robot, scene.loaded)
-    return None if camera.is_carried else camera.T_base_camera(scene.scan_configuration)
 
 
 def _region(

@@ -8,12 +8,14 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 
+from reachmap.cell.bins.support import STEADY_DEG
 from reachmap.cell.loaded import LoadedCell
 from reachmap.cell.loading import cell_path
 from reachmap.cell.text.data import text_at
 from reachmap.cell.text.yaml_reader import parse_yaml
 from reachmap.disk import is_there, real_path
 from reachmap.errors import CellError, SettingsError
+from reachmap.geometry import inverse_transform, tilt_rad
 from reachmap.maps import BinMap, WorkspaceMap, check_output, check_outputs
 from reachmap.maps.summary.statistics import why_unreachable
 from reachmap.runtime.options import RunOptions
@@ -120,6 +122,21 @@ def check_places(
     for name, value in fixed.items():
         if not math.isfinite(value):
             raise SettingsError(f"--fix {name}={value:g}: expected a number")
+
+
+def warn_of_lean(loaded: LoadedCell) -> None:
+    """Warn that place-bin stands a bin upright that leans in the cell."""
+    cell = loaded.cell
+    T_level_bin = inverse_transform(cell.T_base_level()) @ cell.T_base_bin()
+    lean_deg = math.degrees(tilt_rad(T_level_bin[:3, :3]))
+    if lean_deg > STEADY_DEG:
+        logger.warning(
+            "%s: the %s leans by %.3g deg; it is placed upright (bin-scan --cell maps "
+            "it as it leans)",
+            loaded.source,
+            f"bin {cell.bin.name}" if cell.bin.name else "bin",
+            lean_deg,
+        )
 
 
 def written_by(output: Path, run: RunOptions) -> Path:

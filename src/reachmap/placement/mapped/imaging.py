@@ -46,6 +46,14 @@ def can_choose(scene: Scene) -> bool:
     return camera.is_carried or camera.stands
 
 
+def still_camera(scene: Scene) -> FloatArray | None:
+    """Pose of a camera that is not on the tool, in robot_base (4, 4), or None."""
+    if scene.loaded.cell.camera is None:
+        return None
+    camera = Camera(scene.robot, scene.loaded)
+    return None if camera.is_carried else camera.T_base_camera(scene.scan_configuration)
+
+
 def imaging_configurations(
     scene: Scene, goals: FloatArray | None = None, frame: IntArray | None = None
 ) -> Iterator[FloatArray]:
