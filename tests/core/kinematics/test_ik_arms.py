@@ -20,6 +20,7 @@ from tests.support.kinematics_arms import (
     Link,
     misses,
     nearest_branch,
+    pinocchio_tcp,
     robot,
     serial_urdf,
     ur5,
@@ -268,3 +269,48 @@ def test_calibrated_arms_start_from_the_nominal_one(size: float) -> None:
     assert len(np.unique(frame)) == len(Q)
     assert (nearest_branch(found, frame, Q) < 1e-6).mean() >= 0.97
     assert misses(arm, found, T[frame]).max() < 1e-6
+
+
+HALF = np.pi / 2
+# Arms that have a closed form which fails where joints are at right angles.
+RIGHT_ANGLED = {
+    "two axes that meet": [Link(axis=(1, 0, 0)), Link(xyz=(0.3, 0, 0), axis=(0, 1, 0))],
+    "three axes": [
+        Link(xyz=(0, -0.16, -0.03), rpy=(-HALF, 0, 0)),
+        Link(rpy=(-HALF, 0, -HALF)),
+        Link(xyz=(0, -0.21, 0), rpy=(0, 0, HALF), axis=(0, 0, -1)),
+    ],
+    "four axes": [
+        Link(xyz=(0, 0.38, 0), axis=(0, -1, 0)),
+        Link(xyz=(0, -0.11, 0), axis=(-1, 0, 0)),
+        Link(xyz=(0, -0.13, 0.09), axis=(-1, 0, 0)),
+        Link(xyz=(0, 0, 0.26), axis=(0, 1, 0)),
+    ],
+    "parallel wrist": [
+        Link(axis=(0, 1, 0)),
+        Link(axis=(0, 0, -1)),
+        Link(xyz=(-0.25, 0, 0.28), axis=(-1, 0, 0)),
+        Link(axis=(0, -1, 0)),
+        Link(xyz=(0.27, 0.33, 0), axis=(0, 1, 0)),
+        Link(xyz=(0, -0.36, 0.11), axis=(0, 1, 0)),
+    ],
+}
+
+
+@pytest.mark.parametrize("links", RIGHT_ANGLED.values(), ids=RIGHT_ANGLED.keys())
+@pytest.mark.parametrize("noise", [0.0, 1e-14])
+def test_poses_of_joints_at_right_angles_are_solved(
+    links: list[Link], noise: float
+) -> None:
+    """Poses that an arm has by Pinocchio are found; else no proof is claimed."""
+    tcp = {"parent": f"link_{len(links)}", "xyz": [0.0, 0.0, 0.0]}
+    arm = robot(serial_urdf(links), tcp)
+    kinematics = Kinematics(arm)
+    rng = np.random.default_rng(7)
+    Q = rng.choice(np.radians(np.arange(-150, 151, 30)), (300, len(links)))
+    T = np.array([pinocchio_tcp(arm, q) for q in Q])
+    T[:, :3] += noise * rng.standard_normal((len(T), 3, 4))
+    found, frame = kinematics.solve_many(T)
+    assert misses(arm, found, T[frame]).max() < 1e-6
+    lost = len(Q) - len(np.unique(frame))
+    assert lost <= (0 if kinematics.complete else 0.01 * len(Q))

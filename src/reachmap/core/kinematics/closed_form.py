@@ -227,10 +227,23 @@ def _found_again(
 def _regular_configurations(chain: SerialChain, count: int) -> FloatArray:
     rng = np.random.default_rng(2)
     Q = rng.uniform(-np.pi, np.pi, (4 * count, chain.dof))
+    # Tools that point straight down, as most do, put joints at right angles.
+    Q[1::2] = special_configurations(chain.dof, 2 * count)
     _, J = chain.jacobian_many(Q)
     smallest = np.linalg.svd(J, compute_uv=False)[:, -1]
     order = np.argsort(smallest < _REGULAR * smallest.max(), kind="stable")
     return Q[order[:count]]
+
+
+def special_configurations(dof: int, count: int) -> FloatArray:
+    """Random configurations with about every second joint at a multiple of 30 degrees.
+
+    Axes are parallel or meet there that do not elsewhere, and closed forms fail.
+    """
+    rng = np.random.default_rng(3)
+    Q = rng.uniform(-np.pi, np.pi, (count, dof))
+    plain = np.radians(30.0 * rng.integers(-6, 7, Q.shape))
+    return np.where(rng.random(Q.shape) < 0.5, plain, Q)
 
 
 def _rows(chain: SerialChain, dof: int) -> EaikRows | None:

@@ -18,12 +18,14 @@ from reachmap.core.kinematics.closed_form import (
     SELF_TESTS,
     ClosedForm,
     find_closed_form,
+    special_configurations,
 )
 from reachmap.core.kinematics.least_squares import (
     least_squares_many,
     matrix_difference,
     refine_many,
 )
+from reachmap.core.kinematics.nominal import rounded_arm
 from reachmap.core.kinematics.solutions import (
     Rows,
     angular_distance,
@@ -44,6 +46,10 @@ _JUMP_RAD = 0.1
 
 # A pose with this many solutions has all its branches.
 _ALL_BRANCHES = 8
+
+# Poses of special configurations that must have a solution: of arms that lose any, most
+# lose one in a hundred or more.
+_SPECIAL_TESTS = 1000
 
 # Share of the self-test above which a pose has no solution if the closed form has none.
 _TRUSTED = 0.98
@@ -94,7 +100,8 @@ class AnalyticSolver:
     def complete(self) -> bool:
         """Whether a pose without solutions is proved to have none."""
         # At the edge of reach, branches of an arm may lack one of its nominal arm.
-        return self._form.score == SELF_TESTS and not self._form.is_nominal
+        found_all = self._form.score == SELF_TESTS and self._solves_special
+        return found_all and not self._form.is_nominal
 
     @property
     def approximation(self) -> str:
@@ -106,6 +113,7 @@ class AnalyticSolver:
         return (
             f"closed form of the {arm}, {how}; a self-test found "
             f"{self._form.score} of {SELF_TESTS} configurations again"
+            f"{'' if self._trusted else ', the rest is sought by least squares'}"
             f"{self._arm.rounding_note}"
         )
 
@@ -125,10 +133,31 @@ class AnalyticSolver:
             poses = T[start : start + _BLOCK]
             raw, refused = self._rows.with_refused(poses)
             rows = self._with_singular(self._meeting(raw, poses), raw, poses)
-            trusted = self._form.score >= _TRUSTED * SELF_TESTS
-            rows = self._with_lost(rows, poses, refused if trusted else None)
+            rows = self._with_lost(rows, poses, refused if self._trusted else None)
             tables.append((rows[0], rows[1] + start))
         return joined(tables, self._chain.dof)
+
+    @cached_property
+    def _trusted(self) -> bool:
+        """Whether a pose has no solution if the closed form has none."""
+        return self._form.score >= _TRUSTED * SELF_TESTS and self._solves_special
+
+    @cached_property
+    def _solves_special(self) -> bool:
+        """Whether poses of special configurations, singular ones too, are solved.
+
+        Of some structures EAIK loses poses at which two joints are at right angles.
+        """
+        Q = special_configurations(self._chain.dof, _SPECIAL_TESTS)
+        exact = rounded_arm(self._chain) if self.tolerance > ACCEPTED else self._chain
+        T = exact.forward_many(Q)
+        raw, refused = self._rows.with_refused(T)
+        _, solved = self._meeting(raw, T)
+        singular = np.setdiff1d(np.arange(len(T)), np.union1d(solved, refused))
+        T = T[singular]
+        raw = self._rows(T)
+        _, solved = self._with_singular(self._meeting(raw, T), raw, T)
+        return len(np.unique(solved)) == len(T)
 
     def _with_lost(self, rows: Rows, T: FloatArray, among: IntArray | None) -> Rows:
         """Seek numerically what the closed form may have lost, at some poses or all."""
