@@ -406,6 +406,30 @@ def test_a_bin_that_leans_is_said_to_be_placed_upright(
     np.testing.assert_allclose(read_placement(output).bin_pose[2], [0, 0, 1, -0.2])
 
 
+@pytest.mark.parametrize(
+    ("frame", "xyz", "is_said"),
+    [
+        ("world", [0.3, 0.3, -0.19], True),
+        ("robot_base", [0.37, 0.3, -0.19], True),
+        ("world", [0.3, 0.3, -0.23], False),
+        ("world", [0.3, 0.45, -0.19], False),
+    ],
+)
+def test_bodies_that_the_bin_leaves_behind_are_named(
+    toy, tmp_path, frame, xyz, is_said
+):
+    """Those inside it, not those below and beside it."""
+    sphere = '"shape":{"sphere":{"radius":0.005}},"touch":["bin"]'
+    body = f'{{"name":"divider","attach_to":"{frame}","pose":{{"xyz":{xyz}}},{sphere}}}'
+    bin_pose = "bin.pose={xyz: [0.3, 0.3, -0.2]}"
+    pose = ("--bin-pose", "0.1", "0.3", "-0.2", "0")
+    words = ("--set", f"bodies.0={body}", "--set", bin_pose, *pose)
+    output = tmp_path / "placement.h5"
+    result = run("place-bin", toy / "workspace.h5", "-o", output, "-j", 1, *words)
+    assert result.exit_code == 0, result.stderr
+    assert ("inside the bin: divider. Bodies stay" in result.stderr) == is_said
+
+
 def test_with_something_to_stand_on_every_pose_stands_on_it(toy, tmp_path):
     """Heights are those of the table, footprints inside it, and its name is stored."""
     bin_spec = read_cell("planar-toy").cell.bin

@@ -62,7 +62,7 @@ from reachmap.tools.placement_picture import draw_placed
 from reachmap.tools.prologue import (
     check_places,
     refuse_cell_files,
-    warn_of_lean,
+    warn_of_moving,
     with_seed,
 )
 
@@ -172,7 +172,7 @@ def place_bin(
         workspace_map.provenance, str(workspace), with_seed(overrides, seed)
     )
     refuse_cell_files([output, picture], loaded)
-    warn_of_lean(loaded)
+    warn_of_moving(loaded)
     placed = placed_bin(loaded, workspace_map, choice, run)
     write_placement(output, placed.placement, overwrite=run.overwrite)
     if picture is not None:

@@ -26,7 +26,7 @@ from reachmap.maps.provenance import cell_of_artefact
 from reachmap.runtime.options import IN_PROCESS, RunOptions
 from reachmap.tools.place_bin import PlacedBin, PlacementChoice, placed_bin
 from reachmap.tools.placement_picture import draw_placed
-from reachmap.tools.prologue import refuse_cell_files, warn_of_lean, with_seed
+from reachmap.tools.prologue import refuse_cell_files, warn_of_moving, with_seed
 
 if TYPE_CHECKING:
     from reachmap.cell.loading import LoadedCell
@@ -121,7 +121,7 @@ def place_bins(
     }
     refuse_cell_files([*files.values(), *pictures.values()], *cells.values())
     for loaded in cells.values():
-        warn_of_lean(loaded)
+        warn_of_moving(loaded)
     found = _best_order(cells, workspace_map, choice, run)
     for name in names:
         write_placement(files[name], found[name].placement, overwrite=run.overwrite)

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 
-from reachmap.cell.bins.support import STEADY_DEG
+from reachmap.cell.bins.support import STEADY_DEG, bodies_in_bin
 from reachmap.cell.loaded import LoadedCell
 from reachmap.cell.loading import cell_path
 from reachmap.cell.text.data import text_at
@@ -124,9 +124,10 @@ def check_places(
             raise SettingsError(f"--fix {name}={value:g}: expected a number")
 
 
-def warn_of_lean(loaded: LoadedCell) -> None:
-    """Warn that place-bin stands a bin upright that leans in the cell."""
+def warn_of_moving(loaded: LoadedCell) -> None:
+    """Warn of what a bin loses in place-bin: its lean, and bodies inside it."""
     cell = loaded.cell
+    name = f"bin {cell.bin.name}" if cell.bin.name else "bin"
     T_level_bin = inverse_transform(cell.T_base_level()) @ cell.T_base_bin()
     lean_deg = math.degrees(tilt_rad(T_level_bin[:3, :3]))
     if lean_deg > STEADY_DEG:
@@ -134,8 +135,17 @@ def warn_of_lean(loaded: LoadedCell) -> None:
             "%s: the %s leans by %.3g deg; it is placed upright (bin-scan --cell maps "
             "it as it leans)",
             loaded.source,
-            f"bin {cell.bin.name}" if cell.bin.name else "bin",
+            name,
             lean_deg,
+        )
+    inside = bodies_in_bin(cell)
+    if inside:
+        logger.warning(
+            "%s: inside the %s: %s. Bodies stay where they are when it is moved; make "
+            "dividers part of its mesh (bin.mesh)",
+            loaded.source,
+            name,
+            ", ".join(inside),
         )
 
 

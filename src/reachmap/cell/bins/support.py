@@ -74,6 +74,22 @@ def top_faces(cell: Cell, T_to_world: FloatArray) -> tuple[TopFace, ...]:
     return tuple(face for face in faces if face is not None)
 
 
+def bodies_in_bin(cell: Cell) -> list[str]:
+    """Names of bodies on the world or robot_base whose origin is inside the bin."""
+    T_bin_base = inverse_transform(cell.T_base_bin())
+    frames = {"world": T_bin_base @ cell.T_base_world(), "robot_base": T_bin_base}
+    x, y = np.maximum(cell.bin.inner[:2], cell.bin.top) / 2.0 + SLACK_M
+    low = np.array([-x, -y, -SLACK_M])
+    high = np.array([x, y, cell.bin.inner[2] + SLACK_M])
+    found = []
+    for body in cell.bodies:
+        if body.attach_to in frames:
+            p_bin = (frames[body.attach_to] @ body.pose.matrix())[:3, 3]
+            if ((p_bin >= low) & (p_bin <= high)).all():
+                found.append(body.name)
+    return found
+
+
 def _top_face(body: BodySpec, T_to_parent: FloatArray) -> TopFace | None:
     # Imported here: it takes long, and few cells stand their bins on bodies.
     from scipy.spatial import ConvexHull, QhullError
