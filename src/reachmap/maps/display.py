@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+from collections.abc import Callable
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Final
 
@@ -10,6 +11,7 @@ import numpy as np
 
 from reachmap._typing import FloatArray
 from reachmap.errors import MissingExtraError
+from reachmap.maps.parts import Compared
 
 if TYPE_CHECKING:
     from xarray import DataTree
@@ -20,8 +22,8 @@ DRAWING: Final = "reachmap.tools.plot"
 """Where pictures are made; by name, because drawing stands on these records."""
 
 
-class Shown:
-    """Mixin that displays a map interactively."""
+class Shown(Compared):
+    """Mixin that displays a map, or a result about maps, interactively."""
 
     __slots__ = ()
 
@@ -100,11 +102,10 @@ class ShownBin(Shown):
 
 def facts_of(record: Any) -> list[tuple[str, str]]:
     """Headline facts of a map, as name and text."""
-    kind = type(record).__name__
-    facts = {"BinMap": _bin, "WorkspaceMap": _workspace, "BinPlacement": _placement}
+    joints = getattr(record, "joint_names", ())
     return [
-        *facts[kind](record),
-        ("joints", ", ".join(record.joint_names)),
+        *_FACTS[type(record).__name__](record),
+        *([("joints", ", ".join(joints))] if joints else []),
         ("content", record.stamp.content_sha256[:12] or "not stored yet"),
     ]
 
@@ -136,3 +137,42 @@ def _placement(record: Any) -> list[tuple[str, str]]:
         ("rule", record.rule),
         ("candidates", str(len(record.score))),
     ]
+
+
+def _base(record: Any) -> list[tuple[str, str]]:
+    x, y, z = record.base_pose[:3, 3]
+    return [
+        ("base", f"x {x:.3f}, y {y:.3f}, z {z:.3f} m in the world"),
+        ("score", f"{record.score[record.chosen]:.1f} %"),
+        ("candidates", str(len(record.score))),
+    ]
+
+
+def _study(record: Any) -> list[tuple[str, str]]:
+    best = record.assignment[record.best] if record.best >= 0 else "none"
+    return [
+        ("variants", f"{len(record.assignment)}, {record.design}"),
+        ("objectives", ", ".join(record.objective_names)),
+        ("base", record.assignment[record.base]),
+        ("best", best),
+    ]
+
+
+def _robustness(record: Any) -> list[tuple[str, str]]:
+    off = zip(("bin", "camera", "tool"), record.sizes, strict=True)
+    sizes = [f"{name} {1e3 * a:.3g} mm {np.degrees(b):.3g} deg" for name, (a, b) in off]
+    return [
+        ("errors", ", ".join(sizes)),
+        ("scales", ", ".join(f"{scale:g}" for scale in record.scale)),
+        ("perturbed cells", f"{record.reachability.shape[1]} each"),
+    ]
+
+
+_FACTS: Final[dict[str, Callable[[Any], list[tuple[str, str]]]]] = {
+    "BinMap": _bin,
+    "WorkspaceMap": _workspace,
+    "BinPlacement": _placement,
+    "BasePlacement": _base,
+    "Study": _study,
+    "Robustness": _robustness,
+}

@@ -31,6 +31,31 @@ def freeze(record: Any) -> None:
             value.setflags(write=False)
 
 
+class Compared:
+    """Mixin for dataclasses with arrays: equal where every field is, NaN included.
+
+    Equality of the generated kind would be an array. Records are not hashable.
+    """
+
+    __slots__ = ()
+
+    def __eq__(self, other: object) -> bool:
+        if type(other) is not type(self):
+            return NotImplemented
+        names = [item.name for item in dataclasses.fields(self)]  # type: ignore[arg-type]
+        return all(_same(getattr(self, n), getattr(other, n)) for n in names)
+
+    __hash__ = None  # type: ignore[assignment]
+
+
+def _same(one: Any, other: Any) -> bool:
+    if not isinstance(one, np.ndarray):
+        return bool(one == other or (one != one and other != other))
+    if not isinstance(other, np.ndarray) or one.dtype != other.dtype:
+        return False
+    return np.array_equal(one, other, equal_nan=one.dtype.kind == "f")
+
+
 def concatenated(parts: Sequence[Rows]) -> Rows:
     """Dataclasses of arrays, one after another, as one."""
     first: Any = parts[0]
@@ -40,8 +65,8 @@ def concatenated(parts: Sequence[Rows]) -> Rows:
     return whole
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PathStore:
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PathStore(Compared):
     """Ragged store of joint paths (CF contiguous ragged array).
 
     Attributes
@@ -81,8 +106,8 @@ class PathStore:
         return self.configuration[start : start + int(self.row_size[row])]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Components:
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Components(Compared):
     """Connected components of the roadmap: the evidence behind ``no_path_found``.
 
     Attributes
@@ -134,8 +159,8 @@ def confidence_of(checks: IntArray, reached: CodeArray) -> FloatArray:
     return np.asarray(np.where(reached == 1, 1.0, share))
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Refinement:
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Refinement(Compared):
     """Grasps between the test grasps whose verdict alone is known, in any roll.
 
     Attributes
@@ -159,8 +184,8 @@ class Refinement:
         freeze(self)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Effort:
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Effort(Compared):
     """State checks of each attempt.
 
     Attributes
@@ -179,8 +204,8 @@ class Effort:
         freeze(self)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class BestPaths:
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class BestPaths(Compared):
     """The path to execute to each test grasp, whatever its origin.
 
     Attributes
@@ -202,8 +227,8 @@ class BestPaths:
         freeze(self)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ApproachTimes:
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ApproachTimes(Compared):
     """Time optima of the straight approaches and retreats.
 
     Attributes
@@ -219,8 +244,8 @@ class ApproachTimes:
         freeze(self)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Margins:
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Margins(Compared):
     """Margins of the best path and its goal: clearance, joint limits, singularity.
 
     Attributes
@@ -269,8 +294,8 @@ class StageStatus(IntEnum):
     RETURN_NOT_FOUND = 12
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Cycle:
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Cycle(Compared):
     """The stages from the grasp until the robot is back.
 
     Attributes

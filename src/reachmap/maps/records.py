@@ -15,6 +15,7 @@ from reachmap.maps.display import Shown, ShownBin
 from reachmap.maps.parts import (
     ApproachTimes,
     BestPaths,
+    Compared,
     Components,
     Cycle,
     Effort,
@@ -99,8 +100,8 @@ class Stamp:
     format_version: str = "1.1"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class CubeMap:
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class CubeMap(Compared):
     """One cube of a workspace scan. Index order (z, y, x, orientation).
 
     Attributes
@@ -167,7 +168,7 @@ class CubeMap:
         return percent
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False, eq=False)
 class WorkspaceMap(Shown):
     """Path reachability over the cubes, seen from one scan configuration.
 
@@ -198,7 +199,7 @@ class WorkspaceMap(Shown):
         freeze(self)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False, eq=False)
 class BinMap(ShownBin):
     """Every attempt at every test grasp of a bin.
 
@@ -292,7 +293,7 @@ class BinMap(ShownBin):
         freeze(self)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False, eq=False)
 class BinPlacement(Shown):
     """Placement of the bin, the configuration that images it, and the runners-up.
 
@@ -354,8 +355,7 @@ class BinPlacement(Shown):
 
     def T_level_bin(self, row: int | None = None) -> FloatArray:  # noqa: N802
         """The chosen bin, or a candidate's, in the level frame, shape (4, 4)."""
-        row = self.chosen if row is None else row
-        return yaw_transform(*self.candidate_pose[row].tolist())
+        return yaw_transform(*self.candidate_pose[self.chosen if row is None else row])
 
 
 KINDS = ("path", "ik", "ik_free")

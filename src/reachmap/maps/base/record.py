@@ -6,12 +6,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from reachmap._typing import CodeArray, FloatArray, IntArray
+from reachmap.maps.display import Shown
 from reachmap.maps.parts import freeze
 from reachmap.maps.records import Provenance, RunInfo, Stamp
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class BasePlacement:
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False, eq=False)
+class BasePlacement(Shown):
     """Placement of the robot base for a fixed bin. Candidates are rows.
 
     Attributes

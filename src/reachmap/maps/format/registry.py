@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final, TypeAlias
 
-from reachmap.maps.base.format import BASE, base_from_tree
+from reachmap.maps.base.format import BASE, base_from_tree, tree_from_base
 from reachmap.maps.base.record import BasePlacement
 from reachmap.maps.bytes.tree import Tree
 from reachmap.maps.format.assembly import provenance_of
@@ -24,9 +24,13 @@ from reachmap.maps.format.workspace import (
     workspace_map_from_tree,
 )
 from reachmap.maps.records import BinMap, BinPlacement, Provenance, WorkspaceMap
-from reachmap.maps.robustness.format import ROBUSTNESS, robustness_from_tree
+from reachmap.maps.robustness.format import (
+    ROBUSTNESS,
+    robustness_from_tree,
+    tree_from_robustness,
+)
 from reachmap.maps.robustness.record import Robustness
-from reachmap.maps.study.format import STUDY, study_from_tree
+from reachmap.maps.study.format import STUDY, study_from_tree, tree_from_study
 from reachmap.maps.study.record import Study
 
 Artefact: TypeAlias = WorkspaceMap | BinMap | BinPlacement
@@ -40,6 +44,16 @@ _RECORDS: Final[dict[str, Callable[[Tree, Path], Artefact | Result]]] = {
     "base_placement": base_from_tree,
     "study": study_from_tree,
     "robustness": robustness_from_tree,
+}
+
+
+_TREES: Final[dict[str, Callable[[Any], Tree]]] = {
+    "workspace_map": tree_from_workspace_map,
+    "bin_map": tree_from_bin_map,
+    "bin_placement": tree_from_placement,
+    "base_placement": tree_from_base,
+    "study": tree_from_study,
+    "robustness": tree_from_robustness,
 }
 
 
@@ -70,12 +84,8 @@ def kind_of(record: Artefact | Result) -> str:
 
 
 def tree_of(record: Any) -> Tree:
-    """What the file of a map will hold."""
-    if isinstance(record, BinMap):
-        return tree_from_bin_map(record)
-    if isinstance(record, WorkspaceMap):
-        return tree_from_workspace_map(record)
-    return tree_from_placement(record)
+    """What the file of a record will hold."""
+    return _TREES[kind_of(record)](record)
 
 
 LAYOUTS: Final[dict[str, Layout]] = {

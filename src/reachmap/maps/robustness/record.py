@@ -8,6 +8,7 @@ from enum import IntEnum
 import numpy as np
 
 from reachmap._typing import BoolArray, CodeArray, FloatArray, IntArray
+from reachmap.maps.display import Shown
 from reachmap.maps.parts import freeze
 from reachmap.maps.records import Provenance, RunInfo, Stamp
 
@@ -23,8 +24,8 @@ class Certificate(IntEnum):
 CERTIFICATES = tuple(item.name.lower() for item in Certificate)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Robustness:
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False, eq=False)
+class Robustness(Shown):
     """Best paths of a bin map in perturbed cells.
 
     Index order (scale, sample) of the perturbed cells, (layer, y, x, orientation) of

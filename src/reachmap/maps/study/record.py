@@ -8,7 +8,8 @@ from enum import IntEnum
 import numpy as np
 
 from reachmap._typing import BoolArray, CodeArray, FloatArray, IntArray
-from reachmap.maps.parts import freeze
+from reachmap.maps.display import Shown
+from reachmap.maps.parts import Compared, freeze
 from reachmap.maps.records import Provenance, RunInfo, Stamp
 
 PATH_LENGTH = "path_length_rad"
@@ -51,7 +52,7 @@ STATES = tuple(state.name.lower() for state in VariantStatus)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class BinSquares:
+class BinSquares(Compared):
     """What is reached of the bin in each variant, point by point.
 
     Attributes
@@ -71,8 +72,8 @@ class BinSquares:
         freeze(self)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Study:
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False, eq=False)
+class Study(Shown):
     """Variants of a cell. Index order (variant, parameter or objective).
 
     Attributes

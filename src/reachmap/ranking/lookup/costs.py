@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from reachmap._typing import BoolArray, CodeArray, FloatArray, IntArray
 from reachmap.errors import SettingsError
 from reachmap.geometry import transform_points
-from reachmap.maps.parts import StageStatus, freeze
+from reachmap.maps.parts import Compared, StageStatus, freeze
 from reachmap.ranking.lookup.matching import Matches, NearestPoints, Queries
 from reachmap.ranking.lookup.probability import orientation_kernel
 from reachmap.ranking.lookup.settings import ALIKE_STEPS, MARGINS, RankSettings
@@ -49,8 +49,8 @@ UNMATCHED: Final = {
 """States of grasps that the map says nothing about, beside those of test grasps."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Ranking:
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Ranking(Compared):
     """The order of a list of grasps, and why. Rows are in supplied order.
 
     Attributes
