@@ -7,9 +7,13 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 import reachmap
+from reachmap.errors import SettingsError
 from reachmap.maps import write_bin_map
 from reachmap.motions.motion import best_rows
+from reachmap.tools.prologue import with_seed
 from tests.support.toy_artefacts import toy_bin_map
 
 
@@ -74,3 +78,27 @@ def test_what_is_typed_into_a_prompt_answers_in_a_line(tmp_path: Path) -> None:
     for value in (library, served, ranker, ranking, loaded, library.scenes[0]):
         assert repr(value).startswith(f"<{type(value).__name__}: ")
         assert len(repr(value)) < 100
+
+
+def test_a_single_text_is_one_name_not_its_letters(tmp_path: Path) -> None:
+    """Where several may be given, one may be given alone."""
+    pile = Path(__file__).parents[1] / "examples" / "pile-1.json"
+    one = tmp_path / "bin.h5"
+    write_bin_map(one, toy_bin_map())
+    for name in (str(pile), pile):
+        alone = reachmap.rank(name, map_path=one)  # type: ignore[arg-type]
+        assert alone.text == reachmap.rank([pile], map_path=one).text
+    assert [item.path for item in reachmap.verify(str(one)).verdicts] == [one]
+    wider = "bin.inner=[0.4,0.3,0.04]"
+    for cell in (
+        reachmap.load_cell("planar-toy", wider),
+        reachmap.load_cell("planar-toy", [wider]),
+    ):
+        assert cell.cell.bin.inner == (0.4, 0.3, 0.04)
+    assert with_seed(wider, 3) == (wider, "seed=3")
+
+
+def test_a_placement_and_a_cell_contradict_each_other(tmp_path: Path) -> None:
+    """The cell had been scanned, and the placement left unread."""
+    with pytest.raises(SettingsError, match=r"p\.h5 holds the cell"):
+        reachmap.bin_scan(tmp_path / "p.h5", tmp_path / "b.h5", cell="planar-toy")

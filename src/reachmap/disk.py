@@ -9,7 +9,11 @@ from __future__ import annotations
 import errno
 import os
 import stat
+from collections.abc import Iterable
 from pathlib import Path
+from typing import Any, TypeVar
+
+Given = TypeVar("Given")
 
 HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
@@ -88,6 +92,12 @@ def read_up_to(path: Path | str, limit: int) -> bytes | None:
     with Path(path).open("rb") as stream:  # a pipe does not say how long it is
         data = stream.read(limit + 1)
     return data if len(data) <= limit else None
+
+
+def one_or_more(given: Iterable[Given]) -> tuple[Given, ...]:
+    """Items of a collection; a single text or path is one, not its letters."""
+    items: Any = (given,) if isinstance(given, (str, os.PathLike)) else given
+    return tuple(items)
 
 
 def as_path(name: str | Path | None) -> Path | None:

@@ -113,3 +113,18 @@ def test_a_script_needs_no_main_guard(tmp_path, how):
         check=False,
     )
     assert (done.returncode, done.stdout, done.stderr) == (0, "done\n", "")
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"workers": 0}, "workers: expected 1 or more"),
+        ({"workers": "2"}, "workers: expected 1 or more"),
+        ({"shard": (3, 2)}, "i from 1 to N"),
+        ({"shard": "1/2"}, "i from 1 to N"),
+    ],
+)
+def test_wrong_options_of_a_run_are_named(wrong, message):
+    """By the program that makes them, before any work."""
+    with pytest.raises(SettingsError, match=message):
+        RunOptions(**wrong)

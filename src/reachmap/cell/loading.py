@@ -32,7 +32,7 @@ from reachmap.cell.text.yaml_reader import (
     parse_yaml,
     read_text,
 )
-from reachmap.disk import is_file, is_hdf5, is_text, recorded_name
+from reachmap.disk import is_file, is_hdf5, is_text, one_or_more, recorded_name
 from reachmap.errors import CellError
 
 __all__ = [
@@ -76,7 +76,7 @@ def read_cell(name_or_path: str | Path, overrides: Sequence[str] = ()) -> Loaded
     CellError
         Every mistake is a line ``file:line:column: key.path: …``.
     """
-    name_or_path = str(name_or_path)
+    name_or_path, overrides = str(name_or_path), one_or_more(overrides)
     path = cell_path(str(name_or_path))
     check_storable(path)
     if is_hdf5(path):

@@ -7,6 +7,7 @@ import os
 from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import dataclass
+from numbers import Integral
 from pathlib import Path
 from typing import TypeAlias
 from urllib.parse import urlsplit
@@ -55,6 +56,12 @@ class RunOptions:
     quiet: bool = True
 
     def __post_init__(self) -> None:
+        if not _is_count(self.workers):
+            raise SettingsError(f"workers: expected 1 or more (got {self.workers!r})")
+        if self.shard is not None and not _is_share(self.shard):
+            raise SettingsError(
+                f"shard: expected (i, N) with i from 1 to N (got {self.shard!r})"
+            )
         name = self.executor
         if not isinstance(name, str) or name in ("processes", "dask:local"):
             return
@@ -63,6 +70,17 @@ class RunOptions:
                 f"executor {name!r}: expected processes, dask:local or "
                 "dask:tcp://HOST:PORT"
             )
+
+
+def _is_count(workers: object) -> bool:
+    return isinstance(workers, Integral) and int(workers) >= 1
+
+
+def _is_share(shard: object) -> bool:
+    match shard:
+        case (int(one), int(many)):
+            return 1 <= one <= many
+    return False
 
 
 IN_PROCESS = RunOptions()

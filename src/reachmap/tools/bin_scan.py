@@ -13,6 +13,7 @@ import numpy as np
 from reachmap.cell.loading import read_cell
 from reachmap.core.scene import Scene
 from reachmap.disk import as_path
+from reachmap.errors import SettingsError
 from reachmap.maps import (
     BinMap,
     Status,
@@ -72,7 +73,8 @@ def bin_scan(
     output : Path
         The artefact to write.
     cell : str, optional
-        Instead of the placement's cell: shipped name or path.
+        Instead of a placement: shipped name or path; ``ur5-eye-in-hand`` where neither
+        of them nor a workspace is given.
     workspace : Path, optional
         Artefact of workspace-scan: without a placement and a cell, its cell is taken.
     overrides : sequence of str
@@ -144,6 +146,8 @@ def load_placed_cell(
     workspace: Path | None = None,
 ) -> tuple[LoadedCell, str]:
     """Cell to scan, and the content hash of the artefact it is from ("" for none)."""
+    if placement is not None and cell is not None:
+        raise SettingsError(f"{placement} holds the cell; leave out it, or {cell}")
     if cell is not None or (placement is None and workspace is None):
         return read_cell(cell or "ur5-eye-in-hand", overrides), ""
     if placement is not None:

@@ -13,7 +13,7 @@ import numpy as np
 from reachmap.core.planning.time_laws.law import BLENDING_LAWS
 from reachmap.core.robot.model import RobotModel
 from reachmap.core.scene import Scene
-from reachmap.disk import as_path
+from reachmap.disk import as_path, one_or_more
 from reachmap.errors import SettingsError
 from reachmap.maps import read_bin_map
 from reachmap.maps.bytes.publish import check_outputs, publish
@@ -66,7 +66,7 @@ def export(
     MapFileError, OutputError
     """
     map_path = Path(map_path)
-    output = as_path(output)
+    grasps, output = one_or_more(grasps), as_path(output)
     if every == bool(grasps):
         raise SettingsError("name test grasps with --grasp, or take --all of them")
     if to not in WRITERS:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from reachmap.disk import one_or_more
 from reachmap.maps import check_outputs
 from reachmap.runtime.merge import merge_journals
 from reachmap.runtime.run import Outcome
@@ -24,7 +25,7 @@ def merge(
     overwrite : bool
         Replace ``output``.
     """
-    output = Path(output)
+    shards, output = one_or_more(shards), Path(output)
     check_outputs([output], overwrite=overwrite, inputs=shards)
     return merge_journals(
         [Path(shard) for shard in shards], output=output, overwrite=overwrite

@@ -13,7 +13,7 @@ from reachmap.cell.loaded import LoadedCell
 from reachmap.cell.loading import cell_path
 from reachmap.cell.text.data import text_at
 from reachmap.cell.text.yaml_reader import parse_yaml
-from reachmap.disk import is_there, real_path
+from reachmap.disk import is_there, one_or_more, real_path
 from reachmap.errors import CellError, SettingsError
 from reachmap.geometry import inverse_transform, tilt_rad
 from reachmap.maps import BinMap, WorkspaceMap, check_output, check_outputs
@@ -82,7 +82,7 @@ def _files_of(loaded: LoadedCell) -> Iterator[Path]:
 
 def with_seed(overrides: Sequence[str], seed: int | None) -> tuple[str, ...]:
     """Append to overrides the seed of ``--seed``, if one was given."""
-    return (*overrides, *(() if seed is None else (f"seed={seed}",)))
+    return (*one_or_more(overrides), *(() if seed is None else (f"seed={seed}",)))
 
 
 def check_places(

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from reachmap.disk import as_path, is_folder
+from reachmap.disk import as_path, is_folder, one_or_more
 from reachmap.errors import GateFailedError, MapFileError, SettingsError
 from reachmap.maps import read_bin_map
 from reachmap.maps.bytes.publish import (
@@ -150,7 +150,7 @@ def rank(
     ------
     GraspListError, MapFileError, SettingsError, OutputError
     """
-    output, chart = as_path(output), as_path(chart)
+    sources, output, chart = one_or_more(sources), as_path(output), as_path(chart)
     cell = None if cell is None else str(cell)
     settings, list_format = settings or RankSettings(), list_format or ListFormat()
     _check_request(sources, top, chart_top)

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from reachmap.cell.loading import read_cell
+from reachmap.disk import one_or_more
 from reachmap.errors import SettingsError
 from reachmap.maps import read_bin_map, read_placement, read_workspace_map
 from reachmap.maps.bytes.publish import make_folder
@@ -87,7 +88,7 @@ def run_pipeline(
     """
     if run.shard is not None:
         raise SettingsError("a whole run cannot be one of several shards")
-    folder = Path(folder)
+    folder, grasps = Path(folder), one_or_more(grasps)
     changes = with_seed(overrides, seed)
     loaded = read_cell(str(cell), changes)
     if loaded.cell.bins:

@@ -14,6 +14,7 @@ from typing import Any
 from reachmap.cell.loading import LoadedCell, read_cell
 from reachmap.cell.text.overrides import given_as
 from reachmap.core.memo import fingerprint
+from reachmap.disk import one_or_more
 from reachmap.errors import CellError, GateFailedError, SceneError, SettingsError
 from reachmap.maps import Stamp, collect_provenance, config_sha256
 from reachmap.maps.study.record import ALWAYS, OBJECTIVES, Study, VariantStatus
@@ -109,11 +110,11 @@ def study(
         See :mod:`reachmap.errors`. A variant whose cell is wrong is a row with a
         cause, unless all are.
     """
-    cell, output = str(cell), Path(output)
+    cell, output, vary = str(cell), Path(output), one_or_more(vary)
     if run.shard is not None:
         raise SettingsError("--shard: a study is shared out by its workers")
-    requirements = tuple(_requirement(text) for text in require)
-    names = _objective_names(objectives, requirements)
+    requirements = tuple(_requirement(text) for text in one_or_more(require))
+    names = _objective_names(one_or_more(objectives), requirements)
     check_scan_output(output, run, [path_of_cell(cell)])
     overrides = with_seed(overrides, seed)
     base = read_cell(cell, overrides)

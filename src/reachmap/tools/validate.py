@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from reachmap.disk import as_path
+from reachmap.disk import as_path, one_or_more
 from reachmap.errors import GraspListError, SettingsError
 from reachmap.maps import read_bin_map
 from reachmap.maps.bytes.publish import check_outputs, check_picture, publish_json
@@ -136,7 +136,7 @@ def validate(
     ReachmapError
         See :mod:`reachmap.errors`.
     """
-    output, chart = as_path(output), as_path(chart)
+    sources, output, chart = one_or_more(sources), as_path(output), as_path(chart)
     asked, pick = settings or RankSettings(), pick or PickOptions()
     # Paths are judged by J, and cycles by seconds, whatever the settings.
     settings = settings_in_j(asked)

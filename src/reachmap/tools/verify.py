@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from reachmap.disk import one_or_more
 from reachmap.errors import MapFileError
 from reachmap.maps.format.registry import load_any
 from reachmap.maps.format.store import is_sealed
@@ -87,7 +88,8 @@ def verify(paths: Sequence[str | Path]) -> Verification:
     paths : sequence of Path
         Artefacts, or journals of unfinished runs.
     """
-    return Verification(verdicts=tuple(_verdict(Path(path)) for path in paths))
+    verdicts = [_verdict(Path(path)) for path in one_or_more(paths)]
+    return Verification(verdicts=tuple(verdicts))
 
 
 def _verdict(path: Path) -> Verdict:
