@@ -188,7 +188,12 @@ def _limits(c: StarterChoices) -> list[str]:
     else:
         lines.append("    # Velocities are those of the URDF; tighten them here.")
         lines.append("    # velocity_rad_s: 2.0")
-    lines.append("    acceleration_rad_s2: 5.0   # GUESS: a URDF cannot hold them")
+    given = {j.name: j.acceleration for j in c.joints if j.acceleration}
+    if len(given) == len(c.joints):
+        lines.append("    # Accelerations are those of the URDF; tighten them here.")
+        lines.append(f"    acceleration_rad_s2: {scalar(given)}")
+    else:
+        lines.append("    acceleration_rad_s2: 5.0   # GUESS: the URDF lacks them")
     if c.joint_limits:
         lines.insert(0, f"  joint_limits: {scalar(c.joint_limits)}")
         lines[-1] += "; or MoveIt's, if lower"

@@ -103,10 +103,14 @@ def test_an_arm_without_shapes_of_any_kind_is_reported(tmp_path: Path) -> None:
     assert "<visual>" not in warning
 
 
-@pytest.mark.parametrize("axis", ["0 0 0", "1e308 0 0", "0 1e-320 0", "1e200 1e200 1"])
+@pytest.mark.parametrize(
+    "axis",
+    [*(f'xyz="{xyz}"' for xyz in ("0 0 0", "1e308 0 0", "0 1e-320 0", "1e200 1e200 1")),
+     "", 'rpy="0 0 1"'],
+)  # fmt: skip
 def test_axes_that_are_no_directions_are_refused(axis: str) -> None:
     """Engines divide by their length."""
-    urdf = robot(joint("j1", "base", "l1", more=f'<axis xyz="{axis}"/>'), link("base"))
+    urdf = robot(joint("j1", "base", "l1", more=f"<axis {axis}/>"), link("base"))
     urdf = urdf.replace("</robot>", '<link name="l1"/></robot>')
     with pytest.raises(CellError, match="joint 'j1': <axis xyz>: expected a direction"):
         parse_urdf(urdf, "a.urdf")

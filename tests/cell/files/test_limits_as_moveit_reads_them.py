@@ -282,3 +282,55 @@ def test_states_of_virtual_joints_are_passed_over(tmp_path: Path) -> None:
         "robot.srdf=r.srdf", "scan_configuration={group_state: home}"])  # fmt: skip
     assert loaded.scan_configuration_rad == {"j1": 0.5}
     assert "collisions of links not in the URDF" in loaded.warnings[0]
+
+
+@pytest.mark.parametrize(
+    ("rates", "acceleration", "jerk"),
+    [
+        ('acceleration="3" deceleration="2" jerk="40"', 2.0, 40.0),
+        ('acceleration="3"', 3.0, np.inf),
+        ('acceleration="9" jerk="900"', 5.0, 900.0),
+        ('acceleration="0" deceleration="0" jerk="0"', 5.0, np.inf),
+        ('acceleration="inf" jerk="inf"', 5.0, np.inf),
+    ],
+)
+def test_accelerations_and_jerks_of_a_urdf_tighten_those_of_the_cell(
+    tmp_path: Path, rates: str, acceleration: float, jerk: float
+) -> None:
+    """Version 1.2 of the format has them; zeros stand for none."""
+    model = arm(tmp_path, more=LIMIT.replace("/>", f" {rates}/>"))
+    assert float(model.acceleration_rad_s2[0]) == acceleration
+    assert float(model.jerk_rad_s3[0]) == jerk
+
+
+def test_a_cell_needs_no_acceleration_where_the_urdf_has_one(tmp_path: Path) -> None:
+    """Neither does one of a lower scaling, which counts squared and cubed."""
+    rates = LIMIT.replace("/>", ' acceleration="3" jerk="40"/>')
+    limits = "robot.limits={scaling: 0.5}"
+    model = arm(tmp_path, limits, more=rates)
+    assert float(model.acceleration_rad_s2[0]) == 0.75
+    assert float(model.jerk_rad_s3[0]) == 5.0
+
+
+def test_a_velocity_that_can_hardly_be_in_radians_is_named(tmp_path: Path) -> None:
+    """Degrees a second are; what stands for no limit is not."""
+    for given, named in (("120", True), ("20", False), ("1e9", False)):
+        more = LIMIT.replace('velocity="2"', f'velocity="{given}"')
+        urdf = robot(
+            link("base"), link("l1", BOX), joint("j1", "base", "l1", more=more)
+        )
+        warnings = load(tmp_path, urdf, "l1", ["j1"]).warnings
+        assert any("velocity is in rad/s (got 120)" in w for w in warnings) == named
+
+
+def test_limits_of_a_follower_that_are_swapped_are_not_used(tmp_path: Path) -> None:
+    """A finger beside the arm goes where its leader goes; of others it is a mistake."""
+    swapped = LIMIT.replace('"-3"', '"1"').replace('"3"', '"0"')
+    finger = joint("j2", "l1", "l2", more=swapped + '<mimic joint="j1"/>')
+    parts = [link("base"), link("l1", BOX), link("l2", BOX), joint("j1", "base", "l1")]
+    loaded = load(tmp_path, robot(*parts, finger), "l1", ["j1"])
+    (warning,) = loaded.warnings
+    assert "joint 'j2': limit 1 is above 0; not used" in warning
+    assert ends(RobotModel.from_cell(loaded)) == (-3.0, 3.0)
+    with pytest.raises(CellError, match="limit 1 is above 0"):
+        load(tmp_path, robot(*parts, joint("j2", "l1", "l2", more=swapped)), "l1", [])

@@ -6,14 +6,11 @@ the link is never checked; so they are read here.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from xml.etree import ElementTree
 
-import numpy as np
-
-from reachmap._typing import FloatArray
+from reachmap.cell.files.origins import NO_ORIGIN, Origin, Triple, finite_numbers
 from reachmap.cell.model.fields import (
     MAX_LENGTH_M,
     CapsuleShape,
@@ -21,9 +18,7 @@ from reachmap.cell.model.fields import (
     Shape,
     SphereShape,
 )
-from reachmap.geometry import rotation_from_rpy_deg, transform_from_parts
 
-Triple = tuple[float, float, float]
 # Attributes that are lengths, by element.
 _LENGTHS = {
     "box": (("size", 3),),
@@ -32,32 +27,6 @@ _LENGTHS = {
     # The length is without the half-spheres, as in SDF.
     "capsule": (("radius", 1), ("length", 1)),
 }
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Origin:
-    """``<origin>`` of an element [m, rad]."""
-
-    xyz: Triple = (0.0, 0.0, 0.0)
-    rpy: Triple = (0.0, 0.0, 0.0)
-
-    @classmethod
-    def of(cls, element: ElementTree.Element) -> Origin:
-        """Read the origin of an element; its numbers must have been checked."""
-        origin = element.find("origin")
-        given = {} if origin is None else origin.attrib
-        return cls(
-            xyz=_triple(given.get("xyz", "0 0 0")),
-            rpy=_triple(given.get("rpy", "0 0 0")),
-        )
-
-    def matrix(self) -> FloatArray:
-        """Homogeneous matrix, shape (4, 4)."""
-        R = rotation_from_rpy_deg(np.degrees(self.rpy))
-        return transform_from_parts(R, np.array(self.xyz))
-
-
-NO_ORIGIN = Origin()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -174,20 +143,6 @@ def _numbers(element: ElementTree.Element, key: str, count: int) -> list[float]:
             f"<{element.tag} {key}>: expected {numbers} (got {text[:40]!r})"
         )
     return values
-
-
-def finite_numbers(text: str, count: int) -> list[float] | None:
-    """Numbers of an attribute; None unless there are ``count``, all of them finite."""
-    try:
-        values = [float(word) for word in text.split()]
-    except ValueError:
-        return None
-    return values if len(values) == count and all(map(math.isfinite, values)) else None
-
-
-def _triple(text: str) -> Triple:
-    x, y, z = (float(word) for word in text.split())
-    return x, y, z
 
 
 def mesh_scales(shapes: Iterable[LinkShape]) -> dict[str, Triple]:

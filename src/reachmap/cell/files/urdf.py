@@ -15,12 +15,16 @@ import numpy as np
 
 from reachmap._typing import FloatArray
 from reachmap.cell.files.collisions import (
-    NO_ORIGIN,
     LinkShape,
-    Origin,
-    finite_numbers,
     links_without_collision,
     read_collisions,
+)
+from reachmap.cell.files.origins import (
+    NO_ORIGIN,
+    Origin,
+    angles_in_degrees,
+    number_faults,
+    write_quaternions_as_rpy,
 )
 from reachmap.cell.files.robot_text import parse_xml
 from reachmap.errors import CellError
@@ -33,6 +37,9 @@ MOVING = ("revolute", "continuous", "prismatic")
 FREE_JOINTS = ("floating", "planar")
 JOINT_TYPES = (*MOVING, "fixed", *FREE_JOINTS)
 GROUND = "universe"
+# More than any wrist turns (900 degrees) [rad], or joint of an arm moves [rad/s], and
+# less than what some write for no limit: degrees, as it seems.
+_FAR, _FAST, _NO_LIMIT = 30.0, 50.0, 1e4
 # Root elements of other formats that come as XML.
 OTHER_ROOTS = {
     "mujoco": "this is MJCF (MuJoCo)",
@@ -47,8 +54,10 @@ OTHER_ROOTS = {
 class UrdfJoint:
     """One joint. Limits are in rad or m, None where the URDF gives none.
 
-    Soft limits count, as they do for MoveIt; infinite ones are none. A joint that
-    mimics another stands at ``multiplier * position(mimics) + offset``.
+    Accelerations and jerks are in URDFs from version 1.2 on; the lower one of
+    acceleration and deceleration counts. Soft limits count, as they do for MoveIt;
+    infinite ones are none. A joint that mimics another stands at
+    ``multiplier * position(mimics) + offset``.
     """
 
     name: str
@@ -58,6 +67,8 @@ class UrdfJoint:
     lower: float | None = None
     upper: float | None = None
     velocity: float | None = None
+    acceleration: float | None = None
+    jerk: float | None = None
     mimics: str | None = None
     multiplier: float = 1.0
     offset: float = 0.0
@@ -170,8 +181,10 @@ def parse_urdf(text: str, label: str) -> UrdfDescription:
             else ""
         )
         raise CellError(f"{label}: expected <link> elements (got none){hint}")
-    faults: list[str] = _number_faults(root)
-    notes: list[str] = []
+    faults, notes = list[str](), list[str]()
+    write_quaternions_as_rpy(root, faults, notes)
+    faults += number_faults(root)
+    notes += angles_in_degrees(root) if not faults else []
     links = [element.get("name", "") for element in root.findall("link")]
     if faults:  # joints and collision elements need numbers
         raise CellError([f"{label}: {fault}" for fault in faults[:50]])
@@ -215,6 +228,12 @@ def _joint(
         faults.append(f"joint {name!r}: a {kind} joint needs <limit>")
     lower, upper = _bounds(element, name, faults, notes) if bounded else (None, None)
     velocity = _number(limit, "velocity", name, faults)
+    if kind in ("revolute", "continuous") and _FAST < (velocity or 0.0) < _NO_LIMIT:
+        notes.append(f"joint {name!r}: velocity is in rad/s (got {velocity:g})")
+    rates = [
+        _number(limit, key, name, faults)
+        for key in ("acceleration", "deceleration", "jerk")
+    ]
     factors = [
         default
         if (given := _number(mimic, key, name, faults, may_be_infinite=False)) is None
@@ -238,6 +257,8 @@ def _joint(
         lower=lower,
         upper=upper,
         velocity=velocity,
+        acceleration=min((a for a in rates[:2] if a and a > 0), default=None),
+        jerk=rates[2],
         mimics=None if mimic is None else mimic.get("joint", ""),
         multiplier=factors[0],
         offset=factors[1],
@@ -270,11 +291,14 @@ def _bounds(
         for key in ("lower", "upper")
     )  # fmt: skip
     if low is not None and high is not None and low > high:
+        if element.find("mimic") is not None:
+            # It moves as far as its leader, and many files are careless there.
+            notes.append(f"joint {name!r}: limit {low:g} is above {high:g}; not used")
+            return None, None
         faults.append(f"joint {name!r}: limit {low:g} is above {high:g}")
-    widest_rad = max(abs(low or 0.0), abs(high or 0.0))
-    # More than any wrist turns (900 degrees), and less than some say for no limit.
-    if element.get("type") == "revolute" and 30.0 < widest_rad < 1e4:
-        notes.append(f"joint {name!r}: limits are in radians (got {widest_rad:g})")
+    widest = max(abs(low or 0.0), abs(high or 0.0))
+    if element.get("type") == "revolute" and _FAR < widest < _NO_LIMIT:
+        notes.append(f"joint {name!r}: limits are in radians (got {widest:g})")
     soft_low = _number(soft, "soft_lower_limit", name, faults)
     soft_high = _number(soft, "soft_upper_limit", name, faults)
     if (soft_low is None) != (soft_high is None):
@@ -305,7 +329,8 @@ def full_turn(low: float | None, high: float | None) -> tuple[float, float]:
 
 def _axis_faults(element: ElementTree.Element, name: str) -> list[str]:
     axis = element.find("axis")
-    text = "1 0 0" if axis is None else axis.get("xyz", "1 0 0")
+    # Without the element it is x; without numbers the element has no direction.
+    text = "1 0 0" if axis is None else axis.get("xyz", "0 0 0")
     length = math.hypot(*map(float, text.split()))
     # Far from 1 its square is no longer a number that an engine can divide by.
     if 1e-9 < length < 1e9:
@@ -372,24 +397,4 @@ def _structure_faults(links: set[str], joints: list[UrdfJoint]) -> list[str]:
         if steps > len(above):
             faults.append("the links form a cycle")
             break
-    return faults
-
-
-_NUMERIC = (
-    ("origin", "xyz", 3),
-    ("origin", "rpy", 3),
-    ("axis", "xyz", 3),
-)
-
-
-def _number_faults(root: ElementTree.Element) -> list[str]:
-    faults = []
-    for tag, key, count in _NUMERIC:
-        for element in root.iter(tag):
-            text = element.get(key)
-            if text is not None and finite_numbers(text, count) is None:
-                faults.append(
-                    f"<{tag} {key}>: expected {count} finite numbers "
-                    f"(got {text[:40]!r})"
-                )
     return faults

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from reachmap._typing import FloatArray
+from reachmap.cell.files.origins import write_quaternions_as_rpy
 from reachmap.cell.files.robot_text import parse_xml
 from reachmap.cell.files.urdf import (
     FREE_JOINTS,
@@ -113,6 +114,9 @@ def _engine_text(urdf: str, description: UrdfDescription) -> str:
     root = parse_xml(urdf, "robot.urdf")
     # The engine refuses a robot without a name, and has a link of this name itself.
     root.set("name", root.get("name") or "robot")
+    # Older engines know no other version than the first.
+    write_quaternions_as_rpy(root, [], [])
+    root.attrib.pop("version", None)
     shared = {*description.links} & {*description.joints, "universe"}
     for link in root.findall("link"):
         for part in [*link.findall("visual"), *link.findall("collision")]:
@@ -266,9 +270,16 @@ def _left_out(joint: UrdfJoint) -> str:
 def _jerks(
     joints: Sequence[UrdfJoint], given: float | Mapping[str, float] | None
 ) -> FloatArray:
-    if isinstance(given, Mapping):
-        return np.array([given.get(joint.name, math.inf) for joint in joints])
-    return np.full(len(joints), math.inf if given is None else given)
+    rows = []
+    for joint in joints:
+        own = given.get(joint.name) if isinstance(given, Mapping) else given
+        rows.append(min(_known([own, joint.jerk]), default=math.inf))
+    return np.array(rows, float)
+
+
+def _known(limits: Sequence[float | None]) -> list[float]:
+    """Limits that are given: many files have a 0 where nothing is known."""
+    return [c for c in limits if c is not None and math.isfinite(c) and c > 0]
 
 
 def _rates(
@@ -279,12 +290,8 @@ def _rates(
 ) -> FloatArray:
     values, missing = [], []
     for joint in joints:
-        candidates = [joint.velocity or 0.0] if what == "velocity" else []
-        if isinstance(given, Mapping):
-            candidates.append(given.get(joint.name, 0.0))
-        elif given is not None:
-            candidates.append(given)
-        known = [c for c in candidates if math.isfinite(c) and c > 0]
+        own = given.get(joint.name) if isinstance(given, Mapping) else given
+        known = _known([getattr(joint, what), own])
         if not known:
             missing.append(joint.name)
         values.append(min(known, default=math.nan))
