@@ -32,6 +32,18 @@ def test_values_are_yaml_and_later_ones_win() -> None:
     assert cell.seed == 5
 
 
+def test_an_entry_that_is_replaced_by_its_name_keeps_it() -> None:
+    """Only what the path says is left out of the value; a name in it wins."""
+    body = "attach_to: world, shape: {sphere: {radius: 0.01}}"
+    names = [
+        read_cell("planar-toy", [f"bodies.{key}={{{more}{body}}}"]).cell.bodies[0].name
+        for key, more in (("post", ""), ("post", "name: mast, "), ("0", "name: x, "))
+    ]
+    assert names == ["post", "mast", "x"]
+    with pytest.raises(CellError, match="name: is missing"):
+        read_cell("planar-toy", [f"bodies.0={{{body}}}"])
+
+
 def test_the_result_is_that_of_the_edited_file() -> None:
     """An override that says what the file says changes nothing."""
     plain = read_cell("planar-toy")

@@ -104,7 +104,7 @@ def _apply(document: Document, text: str, place: Place, model: type[BaseModel]) 
         ):
             container[key] |= {"value": value.data}
         elif last:
-            container[key] = value.data
+            container[key] = _named(value.data, part, key)
         elif isinstance(container, dict) and container.get(str(key)) is None:
             container[key] = {}
             document.places[location] = place
@@ -118,6 +118,13 @@ def _apply(document: Document, text: str, place: Place, model: type[BaseModel]) 
                 message=mistake.message,
             )
         )
+
+
+def _named(value: Any, part: str, key: str | int) -> Any:
+    """A value, an entry of a list that the path names taking that name."""
+    if isinstance(value, dict) and key != part and not part.isdigit():
+        return {"name": part, **value}
+    return value
 
 
 def _key(
