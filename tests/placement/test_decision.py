@@ -7,6 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 
+from reachmap.cell.loading import read_cell
 from reachmap.core.collision.bin_fit import BinFit
 from reachmap.core.scene import Scene
 from reachmap.errors import SceneError
@@ -17,6 +18,7 @@ from reachmap.placement.decision import (
     settle,
 )
 from reachmap.placement.drop_off_room import DropOffRoom
+from reachmap.placement.mapped.imaging import OUT_OF_SIGHT, still_camera
 from reachmap.placement.mapped.sample import open_frames
 from reachmap.placement.predicted.places import apart_m
 from reachmap.placement.predicted.region import Region
@@ -209,6 +211,36 @@ def test_a_bin_too_high_for_the_camera_is_a_clear_error():
         SceneError, match=r"no scan config.*places \(.*\); look elsewhere"
     ):
         decide_by_search(asked, 2)
+
+
+@pytest.mark.parametrize(("shelf_y_m", "hides"), [(0.0, True), (0.4, False)])
+def test_what_hides_the_bin_from_a_standing_camera_is_named(shelf_y_m, hides):
+    """A camera looks straight down on the bin, past a shelf or on it."""
+    place = f"{{xyz: [0.75, {shelf_y_m}, 0.7]}}"
+    loaded = read_cell(
+        UR5,
+        [
+            "camera.parent=world",
+            "camera.xyz=[0.75,0,1.3]",
+            "camera.rpy_deg=[180,0,0]",
+            "camera.range_m=[0.5,2]",
+            f"bodies.floor={{attach_to: world, shape: {{box: [0.2, 0.2, 0.02]}}, "
+            f"pose: {place}}}",
+        ],
+    )
+    scene = Scene.build(loaded, with_bin=False)
+    asked = dataclasses.replace(
+        problem(hill(0.5, 0.3, 0.0, 0.0)),
+        loaded=loaded,
+        scene=scene,
+        moving=Scene.build(loaded, with_bin=True, bin_moves=True),
+        still_camera=still_camera(scene),
+    )
+    below, aside = (0.75, 0.0, 0.0, 0.0), (0.75, 0.8, 0.0, 0.0)
+    assert asked.can_be_imaged(below) == (not hides)
+    assert ("floor hides" in asked.why_unseen(below)) == hides
+    # Past the edge of the picture, 28.5 degrees off at the most.
+    assert asked.reason_against(aside) == OUT_OF_SIGHT
 
 
 def test_the_bin_keeps_out_of_the_drop_off(caplog):

@@ -349,6 +349,8 @@ def test_the_papers_rule_has_the_papers_point(toy, tmp_path):
     assert result.exit_code == 0, result.stderr
     placement = read_placement(output)
     assert placement.rule == "paper"
+    # All grasps lie above the plane in which the toy arm moves.
+    assert "no IK solution 24); most likely cause: no IK" in result.stderr
     assert placement.paper_choice == placement.chosen
     assert picture.read_text().startswith("<?xml")
 

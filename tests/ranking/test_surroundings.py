@@ -31,8 +31,12 @@ def grasps(seed, count, spread=1.0):
 
 
 def by_loops(p_bin, direction):
-    """The estimate of one grasp inside the lattice, corner by corner."""
+    """The estimate of one grasp, corner by corner around the nearest inner point."""
     table = RANKER.table
+    low, high = table.bin_points.min(axis=0), table.bin_points.max(axis=0)
+    pitches = np.array([*table.pitch_m, max(table.pitch_m)])
+    outside = np.linalg.norm((p_bin - np.clip(p_bin, low, high)) / pitches)
+    p_bin = np.clip(p_bin, low, high)
     lattice = table.bin_points.reshape(*table.shape[:3], 3)
     reached = table.reachable.reshape(table.shape)
     total = nearest = 0.0
@@ -64,7 +68,7 @@ def by_loops(p_bin, direction):
         for axis, _ in kinds.values()
     ]
     beyond = max(0.0, np.arccos(min(nearest, 1.0)) / spacing - 0.5)
-    trust = (1.0 - MAP_WEIGHT) * np.exp(-0.5 * beyond**2)
+    trust = (1.0 - MAP_WEIGHT) * np.exp(-0.5 * (beyond**2 + outside**2))
     return trust * total + (1.0 - trust) * float(np.mean(any_roll))
 
 
@@ -78,6 +82,20 @@ def test_the_estimate_equals_loops_over_the_lattice():
     ]
     ranking = RANKER.rank(points, directions, max_angle_deg=180.0)
     np.testing.assert_allclose(ranking.probability, wanted, atol=1e-9)
+
+
+def test_beyond_the_lattice_distance_counts_in_its_own_pitches():
+    """As in the loops, where x and y have pitches of their own."""
+    p_bin, points, directions = grasps(seed=8, count=300, spread=1.3)
+    ranking = RANKER.rank(points, directions, max_angle_deg=180.0)
+    known = np.isfinite(ranking.probability)
+    inner = RANKER.table.bin_points
+    low, high = inner.min(axis=0), inner.max(axis=0)
+    off = known[:, None] & ((p_bin < low) | (p_bin > high))
+    assert (off.sum(axis=0) > 10).all()
+    rows = np.flatnonzero(off.any(axis=1))[:60]
+    wanted = [by_loops(p_bin[n], directions[n]) for n in rows]
+    np.testing.assert_allclose(ranking.probability[rows], wanted, atol=1e-9)
 
 
 @pytest.mark.parametrize(("reachable", "low", "high"), [(1.0, 0.97, 1), (0.0, 0, 0.03)])

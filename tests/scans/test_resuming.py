@@ -114,12 +114,12 @@ def test_a_unit_that_was_given_up_is_an_error_in_its_map(tmp_path, monkeypatch, 
     bin_scan(None, tmp_path / "whole.h5", cell="planar-toy", overrides=cell)
     whole = read_bin_map(tmp_path / "whole.h5")
     with monkeypatch.context() as change:
-        change.setattr(planning, "GRASPS_PER_UNIT", 10)
+        change.setattr(planning, "GRASPS_PER_UNIT", 14)
         change.setattr(planning, "plan_grasps", fail_at(planning.plan_grasps, 2))
-        with pytest.raises(IncompleteError, match=r"1 of [28] units"):
+        with pytest.raises(IncompleteError, match=r"1 of [26] units"):
             bin_scan(None, output, cell="planar-toy", overrides=cell)
         part, lost = read_bin_map(output), np.zeros(whole.status.shape, bool)
-        lost.flat[10:20] = True
+        lost.flat[14:28] = True
         assert (part.status[lost] == Status.ERROR).all()
         np.testing.assert_array_equal(part.status[~lost], whole.status[~lost])
         for place in (output, store_path(output)):

@@ -13,12 +13,14 @@ from reachmap.cell.model.planner import RoadmapSpec
 from reachmap.core.kinematics.windings import TURN_RAD, Windings
 from reachmap.core.planning.candidates import NearestNeighbours
 from reachmap.core.planning.connection import connect
-from reachmap.core.planning.roadmap import Goals
+from reachmap.core.planning.lazy_prm import LazySamples
+from reachmap.core.planning.roadmap import Goals, Roadmap
 from reachmap.core.scene import Scene
 from reachmap.maps import Status
 from reachmap.sampling.frames import approach_distance_m, bin_test_frames
 from reachmap.scans.ik_survey import survey_frames
 from reachmap.scans.workspace_roadmap import connect_survey
+from tests.support.optional import present
 from tests.support.roadmap_paths import path_to_frame
 
 TOY = Path(__file__).parents[3] / "cells"
@@ -79,6 +81,28 @@ def test_an_approach_keeps_its_goal_from_turning_too_far(scene):
         goals = Goals(Q=Q, frame=np.array([0]), low=Q, high=high)
         found = connect(scene.scan_configuration, goals, scene.motions, spec, seed=1)
         assert found.roadmap.frame_reached[0] == is_reached
+
+
+def test_samples_alone_lead_out_the_other_way_round(scene):
+    """Each goal behind the post is met after a whole turn, over verified motions."""
+    rng = np.random.default_rng(3)
+    robot, motions = scene.robot, scene.motions
+    low, high = np.array([-3.1, -2.0, -2.0]), np.array([UPPER_RAD - TURN_RAD, 2, 2])
+    spec = RoadmapSpec(samples=600)
+    Q = rng.uniform(low, high, (12, 3))
+    for q in Q[scene.checker.free_mask(Q)]:
+        roadmap = Roadmap.of(scene.scan_configuration, Goals.of(q[None], np.array([0])))
+        samples = LazySamples(roadmap, motions, Windings(robot), spec, rng)
+        way = present(samples.way_out(np.array([1]), 20000))
+        assert way.turns.tolist() == [1, 0, 0]
+        assert (way.node, way.goal_node) == (0, 1)
+        np.testing.assert_array_equal(way.path[0], scene.scan_configuration)
+        np.testing.assert_allclose(
+            way.path[-1], q + np.array([TURN_RAD, 0, 0]), atol=1e-12
+        )
+        assert (way.path >= robot.lower_rad).all()
+        assert (way.path <= robot.upper_rad).all()
+        assert motions.path_is_verified(way.path)
 
 
 def test_turns_come_nearest_first_and_completely(scene):
