@@ -21,6 +21,11 @@ from reachmap.core.collision.shapes import coal_shape, convex_hull
 TRIANGLE = np.array([[0.0, 0, 0], [1, 0, 2], [0, 3, 0]])
 
 
+TEXT_STL = b"solid x\n" + 2 * (
+    b"facet normal 0 0 1 outer loop vertex 0 0 0 vertex 1 0 0 vertex 0 1 0\n"
+)
+
+
 def binary_stl() -> bytes:
     """One facet."""
     values = [0.0] * 3 + list(TRIANGLE.ravel())
@@ -66,7 +71,7 @@ FILES = {
     "upper.stl": b"SOLID X\n"
     + b"".join(b"VERTEX %E %E %E\n" % tuple(row) for row in TRIANGLE)
     + b"ENDSOLID X\n",
-    "a.obj": b"# x\nvn 9 9 9\nv 0 0 0\nv 1 0 2 1.0\n v 8 8 8\nv 0 3 0\nf 1 2 3\n",
+    "a.obj": b"# x\nvn 9 9 9\nv 0 0 0\nv 1 0 2 1.0\n v 0 3 0\nf 1 2 3\n",
     "ascii.ply": ply("ascii"),
     "little.ply": ply("binary_little_endian"),
     "big.ply": ply("binary_big_endian"),
@@ -102,6 +107,7 @@ def test_sizes_agree_with_coal(link: str) -> None:
         ("a.dae", b"version https://git-lfs.github.com/spec/v1\noid", "git lfs pull"),
         ("a.stl", b"x" + binary_stl()[1:-1], "truncated"),
         ("a.stl", binary_stl()[:-1], "truncated"),
+        ("a.stl", TEXT_STL[: -len(b"vertex 0 1 0\n")], "a facet lacks a vertex"),
         ("a.stl", b"solid x\nendsolid x\n", "no triangles"),
         ("a.stl", b"solid x\n" + b"vertex 1 2 nan\n" * 3, "not finite"),
         ("a.stl", b"solid x\nvertex 1 2 x\n", "could not convert"),
@@ -261,7 +267,8 @@ def test_collada_primitives_cover_the_same_square(kind: str, corners: str) -> No
         ('meter="1"', 'meter="0,001"', "<unit meter>: .*got '0,001'"),
         ("0 1 2 3 0 1 4", "0 1 2 3 0 1 9", "a vertex that is missing .there are 5"),
         ("0 1 2 3 0 1 4", "0 1 2 3 0 1 -1", "a vertex that is missing"),
-        ("0 1 2 3 0 1 4", "0 1 2", "<polylist> is truncated"),
+        ("0 1 2 3 0 1 4", "0 1 2", "<polylist>: <vcount> and <p> do not fit"),
+        ("0 1 2 3 0 1 4", "0 1 2 3 0 1 4 0", "<vcount> and <p> do not fit"),
         ('url="#g"', 'url="#h"', "names '#h', which is not in the file"),
         ('instance_geometry url="#g"', 'instance_node url="#n"', "nodes that contain"),
         ("0 0 1</translate>", "0 0 x</translate>", "damaged .dae file"),
@@ -285,6 +292,22 @@ def test_binary_stl_may_say_solid_and_have_a_tail(head: bytes, tail: bytes) -> N
     mesh = read_mesh(data, ".stl")
     assert len(mesh.triangles) == 1
     np.testing.assert_allclose(sides(mesh), [1.0, 3.0, 2.0])
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "  v 0 0 0\n\tv 1 0 0\n v 0 1 0\n v 0 0 1\n f 1 2 3\n  f 1 2 4\n",
+        "v 0 0 0 # a\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3#b\n#f 2 3 4\nf 1 2 4 # c\n",
+        "v 0 0 0\r\nv 1 0 0\r\nv 0 1 0\r\nv 0 0 1\r\nf 1 2 \\\r\n 3\r\nf 1 2 4\r\n",
+        "\ufeffv 0 0 0\rv 1 0 0\rv 0 1 0\rv 0 0 1\rf 1 2 3\rf 1 2 4\r",
+    ],
+)
+def test_obj_lines_may_be_written_in_many_ways(text: str) -> None:
+    """Indented, with comments, continued, ended as on any system: nothing is lost."""
+    mesh = read_mesh(text.encode(), ".obj")
+    assert len(mesh.triangles) == 2
+    assert area(mesh) == pytest.approx(1.0)
 
 
 def test_obj_faces_count_from_either_end() -> None:

@@ -165,13 +165,15 @@ Lists = list[IntArray]
 
 def _by_three(lists: Lists, sizes: list[int]) -> list[list[int]]:
     del sizes
-    return [list(p[k : k + 3]) for p in lists for k in range(0, len(p) - 2, 3)]
+    if any(len(p) % 3 for p in lists):
+        raise MeshError("<triangles> is truncated")
+    return [list(p[k : k + 3]) for p in lists for k in range(0, len(p), 3)]
 
 
 def _by_count(lists: Lists, sizes: list[int]) -> list[list[int]]:
     corners = np.concatenate(lists) if lists else np.empty(0, np.int64)
-    if min(sizes, default=0) < 0 or sum(sizes) > len(corners):
-        raise MeshError("<polylist> is truncated")
+    if min(sizes, default=0) < 0 or sum(sizes) != len(corners):
+        raise MeshError("<polylist>: <vcount> and <p> do not fit")
     ends = np.cumsum(sizes, dtype=np.int64)
     return [list(corners[e - n : e]) for n, e in zip(sizes, ends, strict=True)]
 

@@ -8,6 +8,7 @@ and the same set of triangles.
 from __future__ import annotations
 
 import re
+from codecs import BOM_UTF8
 from collections.abc import Callable, Sequence
 from functools import lru_cache
 from typing import Any
@@ -26,6 +27,7 @@ __all__ = ["MeshError", "read_mesh"]
 # of example-robot-data are seldom larger (10 of 171).
 KEPT, KEPT_BYTES = 128, 1 << 20
 UNSCALED = (1.0, 1.0, 1.0)
+_STL_FACET = re.compile(rb"\bfacet\s+normal\b", re.IGNORECASE)
 _STL_VERTEX = re.compile(rb"\bvertex\s+(\S+)\s+(\S+)\s+(\S+)", re.IGNORECASE)
 _OTHERS = {
     ".glb": "glTF", ".gltf": "glTF", ".step": "STEP", ".stp": "STEP",
@@ -125,11 +127,11 @@ def _stl_triangles(data: bytes) -> tuple[FloatArray, IntArray]:
         facet = np.dtype([("n", "<f4", 3), ("v", "<f4", (3, 3)), ("a", "<u2")])
         facets = np.frombuffer(data, facet, count=count, offset=84)
         corners = np.asarray(facets["v"].reshape(-1, 3), float)
-    elif data.lstrip()[:5].lower() == b"solid":
+    elif data.removeprefix(BOM_UTF8).lstrip()[:5].lower() == b"solid":
         corners = _numbers(_STL_VERTEX.findall(data))
         if not len(corners) and b"endsolid" not in data.lower():
             raise MeshError("the STL file is truncated")
-        if len(corners) % 3:
+        if len(corners) % 3 or len(corners) < 3 * len(_STL_FACET.findall(data)):
             raise MeshError("the STL file is truncated: a facet lacks a vertex")
     elif len(data) >= 84 and not count:
         raise MeshError("the mesh has no triangles")
@@ -141,14 +143,15 @@ def _stl_triangles(data: bytes) -> tuple[FloatArray, IntArray]:
 def _obj_triangles(data: bytes) -> tuple[FloatArray, IntArray]:
     vertices: list[Sequence[bytes]] = []
     polygons: list[list[int]] = []
-    for line in data.replace(b"\\\n", b" ").split(b"\n"):
-        if line.startswith((b"v ", b"v\t")):
-            words = line.split()[1:4]
-            if len(words) != 3:
+    # Comments, and blanks before a keyword, may stand in any line.
+    lines = re.sub(rb"\\\r?\n", b" ", data.removeprefix(BOM_UTF8)).splitlines()
+    for keyword, *words in filter(None, (x.partition(b"#")[0].split() for x in lines)):
+        if keyword == b"v":
+            if len(words) < 3:
                 raise MeshError("a vertex needs three numbers")
-            vertices.append(words)
-        elif line.startswith((b"f ", b"f\t")):
-            corners = [int(word.split(b"/")[0]) for word in line.split()[1:]]
+            vertices.append(words[:3])
+        elif keyword == b"f":
+            corners = [int(word.split(b"/")[0]) for word in words]
             if 0 in corners:
                 raise MeshError("a face names vertex 0; they are counted from 1")
             # Negative numbers count backwards from the last vertex so far.
