@@ -47,8 +47,30 @@ def test_parts_lie_in_the_bin_and_on_each_other():
         assert (parts > part).all()
 
 
+def room_around(outline, point):
+    """Least distance of a point from the sides of a rectangle; negative outside."""
+    sides = np.roll(outline, -1, axis=0) - outline
+    inwards = np.column_stack([-sides[:, 1], sides[:, 0]])
+    inwards /= np.linalg.norm(inwards, axis=1, keepdims=True)
+    return float(((point - outline) * inwards).sum(axis=1).min())
+
+
+def test_a_part_whose_middle_is_hidden_waits():
+    """For all that lie over it, by all pairs."""
+    heap, waiting = drop_heap(BIN, (0.03, 0.03, 0.03), 0.8, seed=2), 0
+    for part, position in enumerate(heap.position):
+        over = [
+            later
+            for later in range(part + 1, len(heap))
+            if room_around(heap.outline[later], position[:2]) > 1e-9
+        ]
+        assert set(over) <= {*heap.above[part].tolist()}
+        waiting += len(over) > 0
+    assert waiting > 150
+
+
 def test_what_covers_a_part_lies_over_it():
-    """A part whose middle another one hides waits for it, by all pairs."""
+    """No part waits for one that is nowhere near, or lower."""
     heap = drop_heap(BIN, PART, 0.8, seed=5)
     for part, parts in enumerate(heap.above):
         away = heap.position[parts, :2] - heap.position[part, :2]

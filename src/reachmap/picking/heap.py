@@ -232,14 +232,12 @@ class _Surface:
         return found[0], found[1]
 
     def _covered(self, rest: _Rest) -> list[int]:
-        """Parts so far uncovered that a new one covers."""
+        """Parts that a new one covers: much of what is seen of them, or the middle."""
         owners, cells = np.unique(self._owner[rest.under], return_counts=True)
+        hidden = dict(zip(owners.tolist(), cells.tolist(), strict=True))
         return [
-            owner
-            for owner, hidden in zip(owners.tolist(), cells.tolist(), strict=True)
-            if owner >= 0
-            and (
-                hidden >= COVERED_SHARE * len(self._rest_of[owner].top)
-                or rest.hides(self._rest_of[owner].position)
-            )
+            number
+            for number, other in self._rest_of.items()
+            if hidden.get(number, 0) >= COVERED_SHARE * len(other.top)
+            or rest.hides(other.position)
         ]
