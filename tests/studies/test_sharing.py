@@ -13,7 +13,7 @@ import pytest
 
 from reachmap.cell.loading import LoadedCell, read_cell
 from reachmap.core import trace
-from reachmap.core.memo import Memo, fingerprint, memoized
+from reachmap.core.memo import Memo, fingerprint, memoized, memoized_part
 from reachmap.core.scene import Scene
 from reachmap.core.trace import EVERY, FREE, Trace
 from reachmap.tools import variant
@@ -166,6 +166,32 @@ def test_answers_are_asked_again_near_what_changed() -> None:
     # A body that is in the way nowhere gives what another one like it has given.
     assert memo.computed >= len(truth) > 1
     assert memo.found + memo.computed == 12
+
+
+def in_parts(scene: Scene, Q: np.ndarray) -> list[bool]:
+    """The same, each quarter as a part that is kept by itself."""
+    quarters = np.split(Q, 4)
+    parts = [memoized_part("q", partial(asked, scene, R), R) for R in quarters]
+    return [answer for part in parts for answer in part]
+
+
+def test_parts_are_asked_again_with_the_whole() -> None:
+    """What rests on a part rests on its answers; parts far from a change are kept."""
+    rng = np.random.default_rng(1)
+    Q = rng.uniform(-3.0, 3.0, (40, 3))
+    memo, kept = Memo(), 0
+    with memo.active():
+        for k in range(12):
+            x, y = rng.uniform(-0.5, 0.5, 2).round(3) if k else (0.06, 0.0)
+            loaded = toy(f"bodies.post.pose.xyz=[{x},{y},0]")
+            scene = Scene.build(loaded, with_bin=False)
+            before, whole_before = memo.found, memo.computed
+            with_memo = memoized("k", scene, partial(in_parts, scene, Q))
+            assert scene.checker.checks == len(Q)
+            assert with_memo == asked(scene, Q)
+            if memo.computed > whole_before:
+                kept += memo.found - before
+    assert kept > 0
 
 
 def test_one_body_is_asked_about_by_itself() -> None:

@@ -147,7 +147,7 @@ def load_placed_cell(
 ) -> tuple[LoadedCell, str]:
     """Cell to scan, and the content hash of the artefact it is from ("" for none)."""
     if placement is not None and cell is not None:
-        raise SettingsError(f"{placement} holds the cell; leave out it, or {cell}")
+        raise SettingsError(f"{placement} holds a cell; give either it or {cell}")
     if cell is not None or (placement is None and workspace is None):
         return read_cell(cell or "ur5-eye-in-hand", overrides), ""
     if placement is not None:
