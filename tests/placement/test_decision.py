@@ -17,12 +17,12 @@ from reachmap.placement.decision import (
     paper_pose,
     settle,
 )
-from reachmap.placement.drop_off_room import DropOffRoom
 from reachmap.placement.mapped.imaging import OUT_OF_SIGHT, still_camera
 from reachmap.placement.mapped.sample import open_frames
 from reachmap.placement.predicted.places import apart_m
 from reachmap.placement.predicted.region import Region
 from reachmap.placement.problem import PlacementProblem
+from reachmap.placement.room import DropOffRoom
 from reachmap.placement.search import decide_by_search
 from reachmap.placement.steadying import stated_worst, steadied, worst_of
 from reachmap.placement.tolerance import Tolerance

@@ -8,7 +8,7 @@ import pytest
 from reachmap.cell.loading import read_cell
 from reachmap.core.scene import Scene
 from reachmap.geometry import yaw_transform
-from reachmap.placement.drop_off_room import DropOffRoom
+from reachmap.placement.room import DropOffRoom
 from tests.support.scenes import scene_of
 
 PART = "part={shape: {box: [0.04, 0.04, 0.06]}, pose: {xyz: [0, 0, 0.03]}}"

@@ -111,7 +111,7 @@ def decide_as_given(problem: PlacementProblem, pose: Pose) -> Decision:
     contact = problem.fit.contact(problem.T_base_bin(pose))
     if contact is not None:
         raise SceneError(f"--bin-pose: {contact.pair}")
-    taken = problem.without_drop_off(pose)
+    taken = problem.without_room(pose)
     if taken:
         logger.warning("--bin-pose: %s", taken)
     decision = Decision()

@@ -20,7 +20,6 @@ from reachmap.core.collision.bin_fit import BinFit
 from reachmap.core.scene import Scene
 from reachmap.geometry import yaw_transform
 from reachmap.maps.records import WorkspaceMap
-from reachmap.placement.drop_off_room import DropOffRoom
 from reachmap.placement.mapped.candidates import Candidate, mapped_candidates
 from reachmap.placement.mapped.evaluator import Evaluator
 from reachmap.placement.mapped.exact import ALWAYS, Pose
@@ -38,6 +37,7 @@ from reachmap.placement.predicted.places import (
 )
 from reachmap.placement.predicted.prediction import field_of, footprint_of, predict
 from reachmap.placement.predicted.region import Region
+from reachmap.placement.room import DropOffRoom, PickRoom
 from reachmap.placement.supports import natural_poses
 from reachmap.placement.tolerance import EXACT, Tolerance
 
@@ -76,6 +76,8 @@ class PlacementProblem:
         With the arm at the scan configuration if that stays, else without the arm.
     drop_offs : DropOffRoom or None
         What a bin may not stand in; None where parts are put down nowhere.
+    picks : PickRoom or None
+        Where other bins are picked from; None where there are none.
     evaluator : Evaluator
     """
 
@@ -89,6 +91,7 @@ class PlacementProblem:
     fit: BinFit
     evaluator: Evaluator
     drop_offs: DropOffRoom | None = None
+    picks: PickRoom | None = None
     still_camera: FloatArray | None = None
     tolerance: Tolerance = EXACT
     faces: tuple[TopFace, ...] = ()
@@ -134,14 +137,16 @@ class PlacementProblem:
             With the arm somewhere else than :attr:`fit` has it.
         """
         contact = (fit or self.fit).contact(self.T_base_bin(pose))
-        return self.without_drop_off(pose) if contact is None else contact.reason
+        return self.without_room(pose) if contact is None else contact.reason
 
-    def without_drop_off(self, pose: Pose) -> str:
-        """Say which drop-off the bin leaves no room at, or ""."""
-        if self.drop_offs is None:
-            return ""
-        taken = self.drop_offs.taken(self.T_base_bin(pose))
-        return f"the bin leaves no room at the drop-off {taken}" if taken else ""
+    def without_room(self, pose: Pose) -> str:
+        """Say which drop-off, or which other bin, the bin leaves no room, or ""."""
+        T_base_bin = self.T_base_bin(pose)
+        taken = self.drop_offs.taken(T_base_bin) if self.drop_offs else ""
+        if taken:
+            return f"the bin leaves no room at the drop-off {taken}"
+        taken = self.picks.taken(T_base_bin) if self.picks else ""
+        return f"the bin leaves no room for grasps in bin {taken}" if taken else ""
 
     def support(self, pose: Pose) -> str:
         """Name of the body that the bin stands on at a pose, "" where it floats."""

@@ -38,13 +38,13 @@ from reachmap.placement.decision import (
     settle,
     why_no_place,
 )
-from reachmap.placement.drop_off_room import DropOffRoom
 from reachmap.placement.mapped.evaluator import Evaluator, open_evaluator
 from reachmap.placement.mapped.exact import Pose
 from reachmap.placement.mapped.imaging import can_choose, still_camera
 from reachmap.placement.mapped.sample import open_frames
 from reachmap.placement.predicted.region import AXES, Region, region_of
 from reachmap.placement.problem import PlacementProblem
+from reachmap.placement.room import DropOffRoom, PickRoom
 from reachmap.placement.search import decide_by_search
 from reachmap.placement.settings import placement_settings
 from reachmap.placement.summary import best_rows, placement_facts, row_facts
@@ -277,6 +277,7 @@ def _problem(
         fit=fit,
         evaluator=evaluator,
         drop_offs=DropOffRoom(scene) if cell.drop_offs else None,
+        picks=PickRoom(scene) if cell.bins else None,
     )
 
 

@@ -139,12 +139,15 @@ def _best_order(
     best: dict[str, PlacedBin] = {}
     error: SceneError | None = None
     for order in _orders(tuple(cells)):
+        least = _worst(best) if best else -1.0
         try:
-            found, alone = _in_order(order, cells, workspace_map, choice, run)
+            found, alone = _in_order(order, cells, workspace_map, choice, run, least)
         except SceneError as reason:
             error = reason
             continue
-        if not best or _worst(found) > _worst(best):
+        if not found:
+            continue
+        if _worst(found) > least:
             best = found
         # The first bin had every place to choose from: no order serves it better.
         if _worst(found) >= alone:
@@ -169,8 +172,13 @@ def _in_order(
     workspace_map: WorkspaceMap,
     choice: PlacementChoice,
     run: RunOptions,
+    least: float,
 ) -> tuple[dict[str, PlacedBin], float]:
-    """Placements of all bins, and the worst case of the first while it was alone."""
+    """Placements of all bins, and the worst case of the first while it was alone.
+
+    None where a bin has a worst case of no more than ``least``: others that are put
+    beside it will not raise it.
+    """
     standing: dict[str, BinSpec] = {}
     found: dict[str, PlacedBin] = {}
     for name in order:
@@ -178,6 +186,8 @@ def _in_order(
         placement = found[name].placement
         moved = cells[name].with_changes(bin_pose=placement.bin_pose)
         standing[name] = moved.cell.bin.model_copy(update={"name": None})
+        if _worst({name: found[name]}) <= least:
+            return {}, least
     alone = _worst({order[0]: found[order[0]]})
     # What the others take away from those that stood before them.
     for name in order[:-1]:
