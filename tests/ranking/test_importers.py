@@ -27,6 +27,8 @@ grasps:
     position: [-0.04, 0.06, 0.2]
     orientation: {w: 0.0, xyz: [1.0, 0.0, 0.0]}
     cspace_position: {finger: 0.01}
+    made: 2026-01-01
+object_scale: 0.001
 """
 
 
@@ -57,7 +59,24 @@ def test_isaac_grasp(tmp_path):
     np.testing.assert_allclose(grasps.directions, [[0, 0, -1.0]], atol=1e-15)
     assert grasps.scores.tolist() == [0.75]
     assert grasps.ids == ("grasp_0",)
-    assert grasps.document["source"]["gripper_frame"] == "/World/hand"
+    assert grasps.document["source"] == {
+        "object_frame": "/World/mug",
+        "gripper_frame": "/World/hand",
+        "object_scale": 0.001,
+        "imported_from": "isaac_grasp",
+    }
+    (grasp,) = grasps.document["grasps"]
+    # A date is no value of JSON.
+    assert [key for key in grasp if key.startswith("x_")] == ["x_cspace_position"]
+    assert grasp["x_cspace_position"] == {"finger": 0.01}
+
+
+@pytest.mark.parametrize("nothing", ["", " {}"])
+def test_isaac_files_without_grasps_are_empty_lists(tmp_path, nothing):
+    """The key is there, its value may be left out."""
+    path = tmp_path / "none.yaml"
+    path.write_text(ISAAC.partition("grasps:")[0] + f"grasps:{nothing}\n")
+    assert len(read_grasps(path, frame="robot_base").points) == 0
 
 
 def test_graspnet_rows(tmp_path):
@@ -111,6 +130,7 @@ def test_graspgen(tmp_path):
     np.testing.assert_allclose(grasps.rotations[1], R)
     np.testing.assert_allclose(grasps.directions[1], R[:, 2])
     assert "1 transforms that failed" in grasps.warnings[0]
+    assert grasps.document["source"]["object"] == {"file": "mug.obj", "scale": 1.0}
 
 
 def test_npz_files(tmp_path):

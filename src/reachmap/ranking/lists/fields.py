@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final
 
@@ -46,6 +46,31 @@ class Findings:
     def warn(self, path: JsonPath, message: str) -> None:
         """Record something usable but suspicious."""
         self.warnings.append((path, message))
+
+
+def plain_parts(
+    value: Mapping[Any, Any], known: Collection[str], prefix: str = ""
+) -> dict[str, Any]:
+    """Entries of a foreign record that are to be copied through.
+
+    Those whose names are not `known`, with a prefix, if they can be written as JSON:
+    YAML has dates and numbers that are not finite, for example.
+    """
+    return {
+        f"{prefix}{key}": part
+        for key, part in value.items()
+        if isinstance(key, str) and key not in known and _is_plain(part)
+    }
+
+
+def _is_plain(value: Any) -> bool:
+    if isinstance(value, dict):
+        return all(isinstance(k, str) and _is_plain(v) for k, v in value.items())
+    if isinstance(value, list):
+        return all(map(_is_plain, value))
+    if isinstance(value, float):
+        return math.isfinite(value)
+    return value is None or isinstance(value, str | int)
 
 
 def shown(value: Any) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from reachmap.errors import GraspListError
-from reachmap.ranking.lists.fields import shown
+from reachmap.ranking.lists.fields import plain_parts, shown
 
 
 def document_from_graspgen(data: Any, source: str) -> tuple[dict[str, Any], list[str]]:
@@ -43,7 +43,8 @@ def document_from_graspgen(data: Any, source: str) -> tuple[dict[str, Any], list
     ]
     failed = len(transforms) - len(grasps)
     notes = [f"{failed} transforms that failed in simulation are left out"]
-    document = {"approach_axis": "+z", "grasps": grasps}
+    origin = plain_parts(data, ("grasps",))
+    document = {"approach_axis": "+z", "source": origin, "grasps": grasps}
     return document, notes if failed else []
 
 

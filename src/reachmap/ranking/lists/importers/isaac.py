@@ -6,20 +6,14 @@ from collections.abc import Iterable
 from typing import Any, Final
 
 from reachmap.errors import GraspListError
-from reachmap.ranking.lists.fields import shown
+from reachmap.ranking.lists.fields import plain_parts, shown
 
 MAX_DEPTH: Final = 16
 """Nesting of a document; a list of grasps has 5 levels."""
 
-FRAME_NAMES: Final = (
-    "object_frame",
-    "object_frame_link",
-    "gripper_frame",
-    "gripper_frame_link",
-    "object",
-    "gripper",
-)
-"""Names that programs write into the file; they are copied to the answer."""
+ROOT_KEYS: Final = ("format", "format_version", "grasps")
+GRASP_KEYS: Final = ("position", "orientation", "confidence")
+"""What is converted; all else that programs write is copied to the answer."""
 
 
 def data_from_yaml(text: str, source: str) -> Any:
@@ -89,12 +83,13 @@ def document_from_isaac(data: Any, source: str) -> dict[str, Any]:
     version = str(data.get("format_version"))
     if version.split(".")[0] != "1":
         raise GraspListError(f"{source}: isaac_grasp version 1 is read (got {version})")
-    named = data.get("grasps")
+    # An image without grasps: programs leave the value out.
+    named = {} if data.get("grasps", 0) is None else data.get("grasps")
     if not isinstance(named, dict):
         raise GraspListError(
             f"{source}: grasps: expected names with poses (got {shown(named)})"
         )
-    origin = {key: data[key] for key in FRAME_NAMES if isinstance(data.get(key), str)}
+    origin = plain_parts(data, ROOT_KEYS)
     grasps = [_grasp(str(name), value, source) for name, value in named.items()]
     return {"approach_axis": "+z", "source": origin, "grasps": grasps}
 
@@ -111,6 +106,7 @@ def _grasp(name: str, value: Any, source: str) -> dict[str, Any]:
         "id": name,
         "position": value.get("position"),
         "quaternion_wxyz": [turn["w"], *vector],
+        **plain_parts(value, GRASP_KEYS, "x_"),
     }
     if "confidence" in value:
         grasp["score"] = value["confidence"]
