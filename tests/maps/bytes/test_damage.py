@@ -1,6 +1,7 @@
 """Damaged files: a clean error or exactly what was written, never anything else."""
 
 import os
+import resource
 import signal
 from collections import Counter
 from collections.abc import Callable
@@ -225,6 +226,23 @@ def test_what_a_copy_finds_comes_back() -> None:
 
     with pytest.raises(StructureError, match="paths lacks data"):
         isolation.isolated(complain, b"", trusted=True)
+
+
+@pytest.mark.parametrize("sealed", [True, False])
+def test_a_limit_on_written_files_does_not_make_maps_damaged(
+    originals: list[tuple[bytes, Any, Reader]], tmp_path: Path, sealed: bool
+) -> None:
+    """Reading writes nothing that a user would count."""
+    image, record, read = originals[0]
+    path = tmp_path / "whole.h5"
+    path.write_bytes(image if sealed else image[:-SEAL_BYTES])
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (4096, before[1]))
+    try:
+        found = read(path)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert_records_equal(found, record)
 
 
 def test_a_file_open_for_writing_is_called_that(tmp_path: Path) -> None:

@@ -4,7 +4,8 @@ The HDF5 library trusts what it reads: on an image with a few wrong bits it can 
 ever, or crash. A seal finds damage, but not a forgery with a fitting seal. So an image
 is read in a copy of this process with a limit on its time, which hands the result
 back. Where this process cannot be copied (other threads run in it, or the system is not
-Linux), an image without a seal is first tried out in a new process, which takes longer.
+Linux), or the copy may not write what it has read (a limit on the size of files), an
+image without a seal is first tried out in a new process, which takes longer.
 """
 
 from __future__ import annotations
@@ -43,6 +44,9 @@ SECONDS_PER_BYTE = 0.5e-6
 ALIGNMENT = 64
 MAX_COPIED_BYTES = 512 * 2**20
 """Images larger than this are not worth a second copy of what is in them."""
+
+NO_ROOM = 2
+"""Exit status of a copy that has read an image and cannot hand it back."""
 
 # Generous for starting Python on a busy machine.
 TIME_LIMIT_S = 15.0
@@ -98,10 +102,15 @@ def isolated(
         The function raised it, crashed or did not come to an end.
     """
     if _can_copy() and len(image) <= MAX_COPIED_BYTES:
-        return _in_copy(function, image)
+        with suppress(_NoRoomError):
+            return _in_copy(function, image)
     if not trusted and (reason := reason_against(image)):
         raise StructureError(reason)
     return function(image)
+
+
+class _NoRoomError(Exception):
+    """There is no room for what a copy has read."""
 
 
 def _can_copy() -> bool:
@@ -141,7 +150,10 @@ def _answer(
             found = (function(image), "")
         except StructureError as error:
             found = (None, str(error))
-        _write(found, answer)
+        try:
+            _write(found, answer)
+        except (OSError, MemoryError):
+            os._exit(NO_ROOM)
         os._exit(0)
     finally:
         os._exit(1)
@@ -155,6 +167,8 @@ def _wait(child: int) -> None:
             os.kill(child, signal.SIGKILL)
         os.waitpid(child, 0)
         raise
+    if os.waitstatus_to_exitcode(status) == NO_ROOM:
+        raise _NoRoomError
     if status != 0:
         raise StructureError("HDF5 cannot read it")
 
