@@ -89,6 +89,13 @@ def test_bounds_are_those_of_the_closed_form(toy):
     assert placement.score[rows].max() > 90.0
 
 
+def test_only_out_of_its_plane_has_the_toy_no_margin(toy):
+    """Higher or lower it reaches nothing, and in its plane no body is near."""
+    margin = toy[0].margin
+    assert {name for name, value in margin.items() if value == 0.0} == {"+z", "-z"}
+    assert len(margin) == 8
+
+
 def test_a_cell_that_is_moved_and_turned_gives_the_same(toy, tmp_path):
     """All scores and margins are equal to the bit; places turn with the cell."""
     first, _ = toy
