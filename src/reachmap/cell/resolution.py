@@ -131,11 +131,15 @@ def _write_out_srdf(document: Document, data: dict[str, Any], files: CellFiles) 
         given = at(data, *place)
         if given["group_state"] is None:
             continue
-        values = srdf.states[given["group_state"]]
+        state = given["group_state"]
+        values, broken = srdf.states[state], srdf.broken.get(state, {})
         missing = [name for name in moving if name not in values]
-        if missing:
-            location = (*place, "group_state")
-            document.add(location, f"the state lacks joints: {', '.join(missing)}")
+        unsaid = [name for name in missing if name not in broken]
+        faults = [broken[name] for name in missing if name in broken]
+        if unsaid:
+            faults.append(f"the state lacks joints: {', '.join(unsaid)}")
+        for fault in faults:
+            document.add((*place, "group_state"), fault)
         given["q_rad"] = {name: values[name] for name in moving if name in values}
         given["group_state"] = None
     document.raise_mistakes()

@@ -146,13 +146,26 @@ def test_groups_of_an_srdf() -> None:
     assert found.disabled_pairs == (("a", "c"),)
 
 
-@pytest.mark.parametrize("value", ["", "x", "nan", "1e999"])
+@pytest.mark.parametrize("value", ["", "x", "nan", "1e999", "0 1"])
 def test_a_state_holds_finite_numbers(value: str) -> None:
-    """A group state with anything else is refused."""
+    """What is none is left out and named; values of virtual joints are nobody's."""
     text = f"""<robot name="r"><group_state name="home" group="g">
-        <joint name="ab" value="{value}"/></group_state></robot>"""
-    with pytest.raises(CellError, match="group_state 'home': joint 'ab': expected"):
-        parse_srdf(text, "r.srdf", parse_urdf(robot(*CHAIN), "r.urdf"))
+        <joint name="ab" value="{value}"/><joint name="virtual" value="{value}"/>
+        <joint name="bd" value="0.5"/></group_state></robot>"""
+    found = parse_srdf(text, "r.srdf", parse_urdf(robot(*CHAIN), "r.urdf"))
+    assert found.states == {"home": {"bd": 0.5}}
+    (note,) = found.notes
+    assert note.startswith("r.srdf:2: group_state 'home': joint 'ab': expected one")
+
+
+def test_misspelt_elements_of_an_srdf_are_named() -> None:
+    """Those of the format that say nothing to a map are not."""
+    text = """<robot name="r"><disable_collision link1="a" link2="c"/>
+        <virtual_joint name="v"/><passive_joint name="ab"/><joint_property/>
+        <end_effector name="e"/><link_sphere_approximation link="a"/></robot>"""
+    found = parse_srdf(text, "r.srdf", parse_urdf(robot(*CHAIN), "r.urdf"))
+    (note,) = found.notes
+    assert "<disable_collision> is not read; did you mean 'disable_collisions'" in note
 
 
 XACRO = """<robot name="toy" xmlns:xacro="http://www.ros.org/wiki/xacro">

@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from xml.etree import ElementTree
 from xml.sax.saxutils import quoteattr
 
 from reachmap.cell.files.robot_text import parse_xml
 from reachmap.cell.files.urdf import UrdfDescription
+from reachmap.cell.text.messages import did_you_mean
 from reachmap.errors import CellError
 
 
@@ -24,12 +25,14 @@ class SrdfDescription:
         Group name to joint names.
     states : dict
         State name to joint positions [rad or m].
-        Those of joints with several values, as virtual ones have, are left out.
+        What is not one finite number is left out.
     disabled_pairs : tuple of (str, str)
         Links whose collisions are ignored.
     disabled_links : tuple of str
         Links that are checked against no other link but those of `enabled_pairs`.
     enabled_pairs : tuple of (str, str)
+    broken : dict
+        State name to joints of the robot that have no value there, and why, in words.
     notes : tuple of str
         What is not used, in words.
     """
@@ -39,6 +42,7 @@ class SrdfDescription:
     disabled_pairs: tuple[tuple[str, str], ...] = ()
     disabled_links: tuple[str, ...] = ()
     enabled_pairs: tuple[tuple[str, str], ...] = ()
+    broken: dict[str, dict[str, str]] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
 
     def ignores(self, first: str, second: str) -> bool:
@@ -56,8 +60,7 @@ def parse_srdf(text: str, label: str, robot: UrdfDescription) -> SrdfDescription
     Raises
     ------
     CellError
-        The text is not an SRDF, a state holds something else than finite numbers, or
-        a pair lacks a link.
+        The text is not an SRDF, or a pair lacks a link.
     """
     root = parse_xml(text, label)
     if root.tag != "robot":
@@ -70,9 +73,17 @@ def parse_srdf(text: str, label: str, robot: UrdfDescription) -> SrdfDescription
         for name, element in elements.items()
     }
     faults: list[str] = []
-    notes: list[str] = []
+    unread = dict.fromkeys(e.tag for e in root if e.tag not in _ELEMENTS)
+    notes = [
+        f"{label}: <{tag}> is not read; {did_you_mean(tag, _ELEMENTS)}"
+        for tag in unread
+    ]
     places = _places(root, text, label)
-    states = _states(root, robot, places, faults, notes)
+    broken: dict[str, dict[str, str]] = {}
+    states = _states(root, robot, places, broken, notes)
+    notes += [
+        f"{why}; not used" for joints in broken.values() for why in joints.values()
+    ]
     found = {
         tag: [
             tuple(_attribute(element, key, places[element], faults) for key in keys)
@@ -93,10 +104,17 @@ def parse_srdf(text: str, label: str, robot: UrdfDescription) -> SrdfDescription
         disabled_pairs=tuple((a, b) for a, b in found["disable_collisions"]),
         disabled_links=tuple(a for (a,) in found["disable_default_collisions"]),
         enabled_pairs=tuple((a, b) for a, b in found["enable_collisions"]),
+        broken=broken,
         notes=tuple(notes),
     )
 
 
+# All elements of the format, read or not.
+_ELEMENTS = (
+    *("group", "group_state", "end_effector", "virtual_joint", "passive_joint"),
+    *("disable_collisions", "enable_collisions", "disable_default_collisions"),
+    *("link_sphere_approximation", "joint_property"),
+)
 _PAIR_ELEMENTS = {
     "disable_collisions": ("link1", "link2"),
     "enable_collisions": ("link1", "link2"),
@@ -160,7 +178,7 @@ def _states(
     root: ElementTree.Element,
     robot: UrdfDescription,
     places: dict[ElementTree.Element, str],
-    faults: list[str],
+    broken: dict[str, dict[str, str]],
     notes: list[str],
 ) -> dict[str, dict[str, float]]:
     """Joint positions by name of the state; several groups may have one of a name."""
@@ -168,7 +186,7 @@ def _states(
     for element in root.findall("group_state"):
         name = element.get("name", "")
         values = states.setdefault(name, {})
-        for joint, value in _state(element, robot, places, faults).items():
+        for joint, value in _state(element, robot, places, broken).items():
             if values.setdefault(joint, value) != value:
                 notes.append(
                     f"{places[element]}: group_state {name!r} is given again with "
@@ -181,7 +199,7 @@ def _state(
     element: ElementTree.Element,
     robot: UrdfDescription,
     places: dict[ElementTree.Element, str],
-    faults: list[str],
+    broken: dict[str, dict[str, str]],
 ) -> dict[str, float]:
     values: dict[str, float] = {}
     for joint in element.findall("joint"):
@@ -190,16 +208,15 @@ def _state(
             numbers = [float(word) for word in text.split()]
         except ValueError:
             numbers = []
-        known = robot.joints.get(name)
-        if len(numbers) > 1 and (known is None or not known.moves):
-            continue  # a virtual or planar joint, which no arm plans for
-        if len(numbers) != 1 or not math.isfinite(numbers[0]):
-            faults.append(
-                f"{places[joint]}: group_state {element.get('name')!r}: joint "
-                f"{name!r}: expected one finite number (got {text[:40]!r})"
+        if len(numbers) == 1 and math.isfinite(numbers[0]):
+            values[name] = numbers[0]
+        elif name in robot.joints and robot.joints[name].moves:
+            state = element.get("name", "")
+            broken.setdefault(state, {})[name] = (
+                f"{places[joint]}: group_state {state!r}: joint {name!r}: expected one "
+                f"finite number (got {text[:40]!r})"
             )
-            continue
-        values[name] = numbers[0]
+        # Others are virtual or planar joints, which no arm plans for.
     return values
 
 
