@@ -339,6 +339,19 @@ def test_a_moveit_configuration_is_taken_over(tmp_path: Path) -> None:
     checked(output)
 
 
+def test_an_srdf_may_lie_in_a_folder_of_its_own(tmp_path: Path) -> None:
+    """Beside the file of its macro, as in the packages of makers for ROS 2."""
+    path = urdf(tmp_path / "arm.urdf", arm())
+    config = moveit_config(tmp_path / "m")
+    (config / "srdf").mkdir()
+    (config / "config" / "arm.srdf").rename(config / "srdf" / "arm.srdf")
+    write(config / "srdf" / "arm_macro.srdf", "<robot/>")
+    output = tmp_path / "cell.yaml"
+    new_cell(path, "--moveit-config", config, output=output)
+    assert "srdf: m/srdf/arm.srdf" in output.read_text()
+    assert "joint_limits: m/config/joint_limits.yaml" in output.read_text()
+
+
 def test_no_state_is_taken_that_looks_up(tmp_path: Path) -> None:
     """Then the scan configuration is searched for, and that is said."""
     path = urdf(tmp_path / "arm.urdf", arm())

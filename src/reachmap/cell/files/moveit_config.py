@@ -31,7 +31,7 @@ class MoveItConfig:
 
 
 def find_moveit_config(folder: Path, robot: str) -> MoveItConfig:
-    """Look for the files in ``DIR/config`` and ``DIR``.
+    """Look for the files in ``DIR/config``, ``DIR/srdf`` and ``DIR``.
 
     Parameters
     ----------
@@ -46,7 +46,8 @@ def find_moveit_config(folder: Path, robot: str) -> MoveItConfig:
     """
     if not is_folder(folder):
         raise SettingsError(f"--moveit-config {folder}: no such folder")
-    places = [place for place in (folder / "config", folder) if is_folder(place)]
+    named = (folder / "config", folder / "srdf", folder)
+    places = [place for place in named if is_folder(place)]
     srdf = _the_srdf(folder, places, robot)
     limits = [p / "joint_limits.yaml" for p in places]
     found = next((path for path in limits if is_file(path)), None)
@@ -58,7 +59,7 @@ def find_moveit_config(folder: Path, robot: str) -> MoveItConfig:
     if srdf is None and found is None:
         raise SettingsError(
             f"--moveit-config {folder}: neither an SRDF nor joint_limits.yaml in it or "
-            "in its folder config"
+            "in its folders config and srdf"
         )
     return MoveItConfig(srdf=srdf, joint_limits=found, scenes=scenes)
 
@@ -66,7 +67,9 @@ def find_moveit_config(folder: Path, robot: str) -> MoveItConfig:
 def _the_srdf(folder: Path, places: Sequence[Path], robot: str) -> Path | None:
     """The SRDF: a plain one before a xacro, the robot's own among several."""
     for pattern in ("*.srdf", "*.srdf.xacro"):
-        found = sorted(path for place in places for path in place.glob(pattern))
+        files = [path for place in places for path in place.glob(pattern)]
+        # Files of macros, which makers keep beside, are no SRDF by themselves.
+        found = sorted(path for path in files if "macro" not in path.name)
         own = [path for path in found if path.name.split(".")[0] == robot]
         if len(own or found) == 1:
             return (own or found)[0]
