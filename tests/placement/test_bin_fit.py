@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import coal
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
-from reachmap.core.collision.bin_fit import BinFit
+from reachmap.core.collision.bin_fit import BinFit, ToolFit
 from reachmap.core.scene import Scene
 from reachmap.errors import SceneError
 from reachmap.geometry import yaw_transform
@@ -49,6 +51,48 @@ def test_a_bin_meets_the_pedestal_where_two_rectangles_do(x, y, z, yaw):
     met = contact is not None and contact.other == "pedestal"
     assert met or not narrow
     assert wide or not met
+
+
+def tray():
+    """Bottom and walls of the tray of 6 mm, as sides and middle of boxes."""
+    x, y, z, wall = 0.36, 0.26, 0.05, 0.006
+    outer = (x + 2 * wall, y + 2 * wall)
+    yield (*outer, wall), (0, 0, -wall / 2)
+    for sign in (1, -1):
+        yield (wall, outer[1], z), (sign * (x + wall) / 2, 0, z / 2)
+        yield (outer[0], wall, z), (0, sign * (y + wall) / 2, z / 2)
+
+
+def test_the_tool_meets_the_bin_where_its_bodies_meet_boxes():
+    """The first of its bodies that is within the margin of one, wrist included."""
+    fit, rng = ToolFit(SCENE.robot, SCENE.loaded), np.random.default_rng(2)
+    boxes = [(coal.Box(*sides), np.array(middle, float)) for sides, middle in tray()]
+    request = coal.CollisionRequest()
+    request.security_margin = SCENE.checker.safety_margin_m
+    T = np.tile(np.eye(4), (400, 1, 1))
+    tilts = rng.uniform(-1.0, 1.0, (400, 3)) * [0.6, 0.6, np.pi]
+    T[:, :3, :3] = (
+        Rotation.from_euler("x", np.pi) * Rotation.from_rotvec(tilts)
+    ).as_matrix()
+    # Down to where the wrist is in the bin.
+    T[:, :3, 3] = rng.uniform([-0.22, -0.17, -0.25], [0.22, 0.17, 0.06], (400, 3))
+    wanted = np.full(400, -1)
+    for row, index in np.ndindex(400, len(fit.bodies)):
+        body = fit.bodies[index]
+        place = T[row] @ body.T
+        placed = coal.Transform3s(place[:3, :3], place[:3, 3])
+        for box, middle in boxes:
+            result = coal.CollisionResult()
+            at = coal.Transform3s(np.eye(3), middle)
+            coal.collide(body.shape, placed, box, at, request, result)
+            if result.isCollision() and wanted[row] < 0:
+                wanted[row] = index
+    found = fit.first_hit(T, fit.bodies)
+    np.testing.assert_array_equal(found, wanted)
+    np.testing.assert_array_equal(fit.blocked(T), wanted >= 0)
+    hit = [fit.bodies[index].name for index in {*wanted.tolist()} - {-1}]
+    assert {"wrist_3_link", "camera housing", "suction tube"} <= {*hit}
+    assert (wanted == -1).any()
 
 
 def test_the_bin_may_stand_on_something():
