@@ -176,8 +176,8 @@ def _in_order(
 ) -> tuple[dict[str, PlacedBin], float]:
     """Placements of all bins, and the worst case of the first while it was alone.
 
-    None where a bin has a worst case of no more than ``least``: others that are put
-    beside it will not raise it.
+    No placements where a bin has a worst case of no more than ``least``: others that
+    are put beside it will not raise it.
     """
     standing: dict[str, BinSpec] = {}
     found: dict[str, PlacedBin] = {}
