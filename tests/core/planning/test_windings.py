@@ -83,6 +83,47 @@ def test_an_approach_keeps_its_goal_from_turning_too_far(scene):
         assert found.roadmap.frame_reached[0] == is_reached
 
 
+def first_joint_on(q, distances_m):
+    """Joint 1 while the tool of the toy is drawn back, by trigonometry; None beyond."""
+    yaw = q.sum()
+    wrist = 0.4 * np.exp(1j * q[0]) + 0.2 * np.exp(1j * (q[0] + q[1]))
+    p = wrist - np.asarray(distances_m) * np.exp(1j * yaw)
+    cosine = (np.abs(p) ** 2 - 0.4**2 - 0.2**2) / (2 * 0.4 * 0.2)
+    if (np.abs(cosine) > 0.99).any():
+        return None
+    elbow = np.sign(q[1]) * np.arccos(cosine)
+    angle = np.angle(p) - np.angle(0.4 + 0.2 * np.exp(1j * elbow))
+    return q[0] + (angle - q[0] + np.pi) % TURN_RAD - np.pi
+
+
+def test_an_approach_across_a_limit_is_made_a_turn_further(tmp_path):
+    """Where joint 1 would leave its range while the tool is drawn back, and only there.
+
+    Else the turn that is nearest to the scan configuration is the goal.
+    """
+    lower = -1.9
+    scene = toy_with_limits(tmp_path, lower, lower + TURN_RAD + 0.5)
+    rng = np.random.default_rng(5)
+    bend = rng.uniform(0.6, 2.2, 200) * rng.choice([-1, 1], 200)
+    Q = np.column_stack(
+        [rng.uniform(lower, lower + 0.2, 200), bend, rng.uniform(-0.8, 0.8, 200)]
+    )
+    survey = survey_frames(scene, scene.kinematics.forward_many(Q), 0.05)
+    across = seen = 0
+    for k, q in enumerate(Q):
+        way = first_joint_on(q, np.linspace(0.0, 0.05, 51))
+        if way is None or abs(way.min() - lower) < 1e-3:
+            continue
+        turn = TURN_RAD if way.min() < lower else 0.0
+        grasps = survey.grasps[survey.goals_of(k)]
+        same_elbow = grasps[np.sign(grasps[:, 1]) == np.sign(q[1])]
+        np.testing.assert_allclose(
+            same_elbow, [q + np.array([turn, 0.0, 0.0])], atol=1e-6
+        )
+        across, seen = across + (turn > 0), seen + 1
+    assert 0.1 < across / seen < 0.9
+
+
 def test_samples_alone_lead_out_the_other_way_round(scene):
     """Each goal behind the post is met after a whole turn, over verified motions."""
     rng = np.random.default_rng(3)
