@@ -63,6 +63,7 @@ def test_the_place_is_at_least_as_good_as_the_cells_own(toy):
     assert placement.present >= 0
     assert placement.score[placement.chosen] >= placement.score[placement.present]
     summary = summarise_base(placement)
+    assert summary.exact == len([k for k in placement.exact if k]) < summary.candidates
     assert summary.gain is not None
     assert summary.gain >= 0.0
     assert summary.runner_up is not None

@@ -197,8 +197,19 @@ def test_nothing_is_called_nothing_and_an_effect_an_effect(
     assert made.gained[2, 0] == made.lost[2, 0] == 0
     assert "+0.0 points, not distinguishable from" in sentence(made, 2, 0)
     assert sentence(made, 1, 0).startswith(f"{RADIUS} 0.01 → 0.035: level_average −")
-    nothing, effect = (main_effect(made, k, 0).mean for k in range(2))
+    effects = [main_effect(made, k, 0) for k in range(2)]
+    nothing, effect = (found.mean for found in effects)
     assert nothing[0] == nothing[1]
+    # Means of two: half the root of the squares of their own halves.
+    for k, rows in enumerate(([0, 2], [1, 3])):
+        value = made.objective[rows, 0]
+        low, high = (
+            np.hypot(*(bound[rows, 0] - value)) / 2
+            for bound in (made.objective_low, made.objective_high)
+        )
+        assert effects[1].low[k] == pytest.approx(value.mean() - low)
+        assert effects[1].high[k] == pytest.approx(value.mean() + high)
+        assert 0.0 < low < 100.0
     assert effect[1] < effect[0]
     # The closed form of the toy: joint 1 is blocked within asin((r + 0.012) / 0.06).
     blocked = [np.arcsin((r + 0.012) / 0.06) for r in (0.01, 0.035)]

@@ -62,6 +62,22 @@ def test_counts_and_means_are_those_of_a_loop():
     assert found.ends[0].status == "ik in collision"
 
 
+def test_cycles_of_each_drop_off_are_counted():
+    """Those that are whole, the first drop-off as well as the others."""
+    record = with_cycles()
+    rng = np.random.default_rng(6)
+    to = rng.integers(0, 3, record.status.shape)
+    whole = np.isfinite(record.cycle.cycle_time)
+    drop_off = np.where(whole, to, -1)
+    cycle = dataclasses.replace(record.cycle, drop_off=drop_off)
+    found: Any = summarise_cycle(dataclasses.replace(record, cycle=cycle))
+    assert [number for _, number in found.drop_offs] == [
+        sum(to[place] == k for place in zip(*np.nonzero(whole), strict=True))
+        for k in range(3)
+    ]
+    assert len({name for name, _ in found.drop_offs}) == 3
+
+
 def test_the_stage_that_was_tried_is_the_one_that_fails():
     """A drop-off out of reach is the end, not the transfer that nobody tried."""
     record = with_cycles()
