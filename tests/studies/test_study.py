@@ -15,7 +15,11 @@ from scipy import stats
 
 from reachmap.cli.text.study import study_lines
 from reachmap.errors import CellError, SettingsError
-from reachmap.maps.comparison.significance import paired_interval, paired_means
+from reachmap.maps.comparison.significance import (
+    clustered_shares,
+    paired_interval,
+    paired_means,
+)
 from reachmap.maps.study.format import read_study
 from reachmap.maps.study.record import Study
 from reachmap.maps.study.words import sentence
@@ -247,6 +251,17 @@ def test_intervals_hold_what_they_say() -> None:
     ends = oracle.confidence_interval(0.95)
     assert (low, high) == pytest.approx((ends.low, ends.high))
     assert mean == pytest.approx(values.mean())
+
+
+def test_intervals_hold_where_frames_fail_together() -> None:
+    """Points of nine frames that change alike: coverage by simulation, no more."""
+    rng = np.random.default_rng(7)
+    cluster, inside = np.repeat(np.arange(80), 9), 0
+    for _ in range(1000):
+        of_point = rng.choice([1.0, -1.0, 0.0], 80, p=[0.2, 0.1, 0.7])
+        _, low, high = clustered_shares(np.repeat(of_point, 9), cluster)
+        inside += low <= 0.1 <= high
+    assert 0.92 < inside / 1000 < 0.975
 
 
 @pytest.mark.slow
