@@ -235,6 +235,26 @@ def test_names_must_be_free(tmp_path):
     assert any("'pedestal' is the name of" in line for line in caught.value.lines)
 
 
+@pytest.mark.parametrize("name", ["left", "right"])
+def test_a_mistake_has_the_place_where_it_is_written(tmp_path, name):
+    """Line and column in a bin that is written in lines, picked from or not."""
+    bins = "bins:\n" + "".join(
+        f"  {one}:\n    inner: [0.3, 0.2, 0.05]\n    wall: {wall}\n"
+        f"    pose: {{xyz: [0.45, {y}, -0.05]}}\n"
+        for one, y, wall in (
+            ("left", 0.18, "thin" if name == "left" else 0.006),
+            ("right", -0.18, "thin" if name == "right" else 0.006),
+        )
+    )
+    path = write(tmp_path, bins)
+    lines = Path(path).read_text().splitlines()
+    line = 1 + next(k for k, text in enumerate(lines) if "wall: thin" in text)
+    with pytest.raises(CellError) as caught:
+        read_cell(path)
+    (said,) = caught.value.lines
+    assert said.startswith(f"{path}:{line}:11: bins.{name}.wall: expected a number")
+
+
 def test_a_cell_without_names_has_none_to_choose():
     """`pick_from` needs bins."""
     with pytest.raises(CellError, match="no bins by name"):
