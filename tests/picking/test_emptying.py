@@ -249,7 +249,7 @@ def test_parts_may_be_round_or_meshes_and_what_stays_is_drawn(bin_map, tmp_path)
 
 
 def test_the_command_says_it_in_words_and_numbers(bin_map, tmp_path):
-    """Table, JSON and the file agree; the empty bin is named on stderr."""
+    """Table, JSON and the file agree; what the map does not know is on stderr."""
     words = ["empty", str(bin_map), "--part", "30x20x10mm", "--seed", "3"]
     out = tmp_path / "parts.json"
     said = CliRunner().invoke(group, [*words, "-o", str(out)])

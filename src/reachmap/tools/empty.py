@@ -314,8 +314,8 @@ def _warn(cell: Cell, bin_map: BinMap, map_path: Path) -> None:
     """Say what the map does not know about heaps."""
     if not cell.bin_scan.is_filled:
         logger.warning(
-            "%s: made in an empty bin, where parts below the picked one are not "
-            "obstacles (bin_scan.fill scans several levels of filling)",
+            "%s: made without levels of filling, so parts below the picked one are not "
+            "obstacles (bin_scan.fill scans several levels)",
             map_path,
         )
     elif len(bin_map.layer) == 1:

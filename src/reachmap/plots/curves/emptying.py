@@ -68,7 +68,7 @@ def draw_emptying(bin_map: BinMap, emptying: Emptying) -> Figure:
         axes.spines[spine].set_visible(False)
     obstacle = "parts below each level are an obstacle"
     if not emptying.filled:
-        obstacle = "the bin is empty except for the picked part"
+        obstacle = "parts below each level are no obstacle"
     cell_name = view_of(bin_map).cell_name
     said = (obstacle, cell_name)
     title = emptying.sentence
