@@ -139,20 +139,28 @@ def test_a_package_that_is_named_stays_in_the_cell(
     checked(home / "cell.yaml")
 
 
-@pytest.mark.parametrize("variable", ["REACHMAP_PACKAGE_PATH", "ROS_PACKAGE_PATH"])
+@pytest.mark.parametrize(
+    ("variable", "below"),
+    [
+        ("REACHMAP_PACKAGE_PATH", ""),
+        ("ROS_PACKAGE_PATH", ""),
+        ("AMENT_PREFIX_PATH", "share"),
+    ],
+)
 def test_a_package_of_the_environment_is_written_down(
-    variable: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    variable: str, below: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The next shell does not have the variable."""
-    write(tmp_path / "far" / "ws" / "x" / "only_here" / "m" / "a.stl", STL)
+    folder = tmp_path / "far" / "ws" / "x"
+    write(folder / below / "only_here" / "m" / "a.stl", STL)
     path = urdf(tmp_path / "home" / "arm.urdf", arm(mesh_of("only_here")))
-    monkeypatch.setenv(variable, str(tmp_path / "far" / "ws" / "x"))
+    monkeypatch.setenv(variable, str(folder))
     output = path.parent / "cell.yaml"
     new_cell(path, output=output)
     monkeypatch.delenv(variable)
     checked(output)
     assert read_cell(str(output)).cell.resources.packages == {
-        "only_here": str(tmp_path / "far" / "ws" / "x" / "only_here")
+        "only_here": str(folder / below / "only_here")
     }
 
 
