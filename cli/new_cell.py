@@ -8,7 +8,12 @@ from typing import TYPE_CHECKING
 
 import click
 
-from reachmap.cli.options import json_option, output_option, overwrite_option
+from reachmap.cli.options import (
+    INPUT_FILE,
+    json_option,
+    output_option,
+    overwrite_option,
+)
 from reachmap.cli.terminal import print_answer
 
 if TYPE_CHECKING:
@@ -58,7 +63,7 @@ def _pairs(
 @click.option(
     "--moveit-config",
     metavar="FOLDER",
-    type=click.Path(path_type=Path),
+    type=INPUT_FILE,
     help="Take SRDF, joint limits, named states and planning-scene bodies from a "
     "MoveIt configuration.",
 )

@@ -48,8 +48,6 @@ Decorator = Callable[[Decorated], Decorated]
 
 FOR_ALL = frozenset({"cell", "workers", "executor", "progress"})
 
-INPUT_FILE = click.Path(path_type=Path)
-OUTPUT_PATH = click.Path(path_type=Path)
 # What a name ends in promises what is in the file.
 SUFFIXES = {
     ".h5": "an artefact (HDF5)",
@@ -64,7 +62,25 @@ SUFFIXES = {
 A_FOLDER = "a folder"
 
 
-class OutputPath(click.Path):
+class NamedPath(click.Path):
+    """A path with a name: what a script's unset variable leaves is none."""
+
+    def __init__(self) -> None:
+        super().__init__(path_type=Path)
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> Any:
+        """Refuse the empty name, which would be the current folder."""
+        if not os.fspath(value):
+            self.fail("a name is missing (got '')", param, ctx)
+        return super().convert(value, param, ctx)
+
+
+INPUT_FILE = OUTPUT_PATH = NamedPath()
+
+
+class OutputPath(NamedPath):
     """A path whose suffix does not promise another kind of file.
 
     Parameters
@@ -75,7 +91,7 @@ class OutputPath(click.Path):
     """
 
     def __init__(self, holds: str) -> None:
-        super().__init__(path_type=Path)
+        super().__init__()
         self.holds = holds
 
     def convert(

@@ -208,3 +208,22 @@ def test_a_name_does_not_promise_another_kind_of_file(
     assert result.exit_code == 2, result.output
     assert message in result.stderr
     assert state_of(folder) == before
+
+
+@pytest.mark.parametrize("command", sorted({command for command, _ in WRITERS}))
+def test_an_empty_name_is_no_output(command, tmp_path, monkeypatch):
+    """As a script's unset variable leaves it: nothing appears in the folder."""
+    monkeypatch.chdir(tmp_path)
+    words = ["" if word == "{o}" else word for word in command.split()]
+    result = CliRunner().invoke(group, words)
+    assert result.exit_code == 2
+    assert "a name is missing (got '')" in result.stderr
+    assert not [*tmp_path.iterdir()]
+
+
+def test_an_empty_cell_is_not_the_usual_one(tmp_path, monkeypatch):
+    """It is named, and nothing is scanned."""
+    monkeypatch.chdir(tmp_path)
+    result = CliRunner().invoke(group, ["bin-scan", "--cell", "", "--dry-run"])
+    assert result.exit_code == 2
+    assert "'' is neither a shipped cell nor a file" in result.stderr

@@ -149,7 +149,7 @@ def load_placed_cell(
     if placement is not None and cell is not None:
         raise SettingsError(f"{placement} holds a cell; give either it or {cell}")
     if cell is not None or (placement is None and workspace is None):
-        return read_cell(cell or "ur5-eye-in-hand", overrides), ""
+        return read_cell("ur5-eye-in-hand" if cell is None else cell, overrides), ""
     if placement is not None:
         placed = (
             read_base(placement)
