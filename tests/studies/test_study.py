@@ -102,6 +102,20 @@ def test_a_study_whose_variants_all_fail_ends_as_wrong_input(tmp_path: Path) -> 
     assert all("touches" in cause for cause in read_study(tmp_path / "s.h5").cause)
 
 
+@pytest.mark.parametrize("mode", ["--place", "--keep-bin"])
+def test_a_bin_that_leans_is_placed_upright_with_a_warning(
+    tmp_path: Path, mode: str
+) -> None:
+    """Where the bin stays, its lean does."""
+    made = reachmap(
+        tmp_path, "study", "planar-toy", mode, "-o", "s.h5", "-j", "1",
+        "--set", "bin.pose={xyz: [0.3, 0.3, -0.2], rpy_deg: [0, 20, 0]}",
+        "--vary", "scan_configuration.q_deg.joint_1=0,1",
+    )  # fmt: skip
+    assert made.returncode == 2, made.stderr
+    assert ("it is placed upright" in made.stderr) == (mode == "--place")
+
+
 @pytest.mark.slow
 def test_a_placed_bin_is_that_of_place_bin(tmp_path: Path) -> None:
     """With --place each variant rests on a placement, by content hash."""

@@ -40,6 +40,7 @@ from reachmap.tools.prologue import (
     check_scan_output,
     path_of_cell,
     refuse_cell_files,
+    warn_of_moving,
     with_seed,
 )
 from reachmap.tools.variant import (
@@ -119,6 +120,8 @@ def study(
     overrides = with_seed(overrides, seed)
     base = read_cell(cell, overrides)
     refuse_cell_files([output], base)
+    if place:
+        warn_of_moving(base)
     _check_objectives(names, base)
     factors = _factors(vary, base, samples, optimise, halving=halving)
     for change in choices_of(factors):
