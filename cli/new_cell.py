@@ -102,6 +102,8 @@ def command(
     from reachmap.errors import SceneError
     from reachmap.tools.new_cell import new_cell
 
+    for name in arguments.keys() & xacro_args.keys():
+        raise click.UsageError(f"--xacro-arg {name}: given twice, also as {name}:=…")
     made = new_cell(
         urdf,
         output=output,

@@ -27,6 +27,7 @@ def run(command: str, **how: object) -> Result:
         ("rank g.json --margin wind_up 2 --margin wind_up 3", "wind_up: given twice"),
         ("place-bin a.h5 --fix z=0 --fix yaw=0 --fix z=1", "z is given twice"),
         ("robust a.h5 --bin 5mm --tool 1mm --bin 3deg", "--bin: given twice"),
+        ("new-cell a.urdf a:=1 --xacro-arg a=2", "--xacro-arg a: given twice"),
         ("rank g.json --explain a --top 3", "--top: --explain is about one grasp."),
         ("validate bin.h5 --random 3 --frame bin", "--frame: needs GRASPS."),
         ("validate bin.h5 --random 3 --from suction", "--from: needs GRASPS."),

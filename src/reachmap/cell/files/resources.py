@@ -282,7 +282,7 @@ def _normal(path: Path) -> Path:
 
 def _existing(reference: str, candidates: list[Path]) -> Path:
     """First candidate that is a file."""
-    paths = [_normal(path) for path in candidates]
+    paths = list(dict.fromkeys(map(_normal, candidates)))
     for path in paths:
         if is_file(path):
             return path
