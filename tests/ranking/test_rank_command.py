@@ -13,8 +13,18 @@ import pytest
 from click.testing import CliRunner
 
 from reachmap.cli import group
-from reachmap.ranking.lists.reading import FORMATS
+from reachmap.ranking import (
+    Ranker,
+    RankSettings,
+    document_text,
+    grasps_from_document,
+    rank_list,
+    ranked_document,
+)
+from reachmap.ranking.lists.document import MAX_GRASPS
+from reachmap.ranking.lists.reading import FORMATS, MAX_BYTES
 from tests.support.optional import present
+from tests.support.ranking_maps import make_bin_map
 
 HEAVY = ("pinocchio", "coal", "ompl", "eaik", "matplotlib", "pydantic", "viser")
 
@@ -247,6 +257,26 @@ def test_a_camera_list_is_ranked_with_the_pose_of_its_frame(folder):
     for one, other in zip(posed["grasps"], native, strict=True):
         assert one["id"] == other["id"]
         assert one["reachmap"]["cost"] == pytest.approx(other["reachmap"]["cost"])
+
+
+def test_the_longest_ranked_list_can_be_ranked_again():
+    """Whatever is asked for: its file is no larger than what is read."""
+    bin_map = make_bin_map(seed=7, reachable=0.9)
+    points = bin_map.position.reshape(-1, 3).tolist()
+    grasp = {"score": 0.123456789012345, "quadrant": "NE", "x_planner": "a" * 100}
+    turn = [0.123456789012345, 0.987654321098765, 0.0, 0.096537]
+    grasps = [
+        {"id": f"{k:06}", "position": p, "quaternion_wxyz": turn, **grasp}
+        for k, p in enumerate(points)
+    ]
+    head = {"format": "reachmap.grasps", "format_version": "1.0"}
+    document = {**head, "frame": "robot_base", "grasps": grasps}
+    settings = RankSettings(likeness=0.3, roll="free", max_angle_deg=180.0)
+    listed = rank_list(
+        grasps_from_document(document), Ranker(bin_map), settings=settings
+    )
+    text = document_text(ranked_document(listed))
+    assert len(text) / len(grasps) * MAX_GRASPS < MAX_BYTES
 
 
 def test_the_story_of_a_reachable_grasp(folder):

@@ -34,8 +34,9 @@ from reachmap.ranking.lists.json_text import (
 from reachmap.ranking.lookup.settings import Invalid
 
 STDIN: Final = "-"
-# A choice against hostile input: room for MAX_GRASPS at 330 bytes each.
-MAX_BYTES: Final = 32 * 2**20
+# A choice against hostile input: room for MAX_GRASPS at 1,000 bytes each, which is more
+# than a ranked grasp takes.
+MAX_BYTES: Final = 96 * 2**20
 
 COMPRESSED: Final = {
     b"\x1f\x8b": "gzip",
