@@ -65,6 +65,15 @@ def test_shipped_cells_agree_with_the_schema(name: str) -> None:
     ]
 
 
+def test_the_schema_asks_for_one_bin_or_several() -> None:
+    """By name in the place of the one, and for either."""
+    validator = jsonschema.Draft202012Validator(cell_schema())
+    data = YAML(typ="safe", pure=True).load(shipped_cells()["planar-toy"].read_text())
+    bin_spec = data.pop("bin")
+    assert [error.validator for error in validator.iter_errors(data)] == ["anyOf"]
+    validator.validate({**data, "bins": {"left": bin_spec, "right": bin_spec}})
+
+
 def test_the_schema_describes_every_key() -> None:
     """Every property of every definition has a description."""
     for definition in [cell_schema(), *cell_schema()["$defs"].values()]:
