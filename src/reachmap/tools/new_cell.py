@@ -241,7 +241,7 @@ class _Attempt:
         except CellError:
             raise
         except ReachmapError as error:
-            return error.lines
+            return tuple(map(_without_label, error.lines))
 
     def _loaded(self) -> LoadedCell:
         """The cell as it would be read from disk."""
@@ -396,4 +396,4 @@ def _body_lines(source: RobotSource, arm: RobotModel) -> list[str]:
 
 
 def _without_label(line: str) -> str:
-    return re.sub(rf"^{LABEL}:\d+:\d+: ", "", line)
+    return re.sub(rf"^{LABEL}(:\d+:\d+)?: ", "", line)

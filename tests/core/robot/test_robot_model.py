@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -21,6 +22,8 @@ from tests.support.kinematics_arms import (
     ur5,
     urdf_text,
 )
+from tests.support.small_cells import LIMIT, joint, link, load
+from tests.support.small_cells import robot as small_robot
 
 TWO = [Link(axis=(0, 0, 1)), Link(xyz=(0.3, 0, 0), axis=(0, 1, 0))]
 
@@ -232,3 +235,26 @@ def test_arrays_of_an_arm_cannot_be_changed() -> None:
     """A robot is a value: its arrays are read-only."""
     with pytest.raises(ValueError, match="read-only"):
         ur5().lower_rad[0] = 0.0
+
+
+@pytest.mark.parametrize(
+    ("override", "said"),
+    [
+        ("seed=1", r"cell\.yaml:7:11: robot\.limits: joint 'j1' has no range left"),
+        (
+            "robot.locked_joints_deg={j2: 300}",
+            r"^--set robot\.locked_joints_deg=.*: robot\.locked_joints_deg: joint 'j2'",
+        ),
+    ],
+)
+def test_what_is_wrong_with_the_arm_of_a_cell_has_its_place(
+    tmp_path: Path, override: str, said: str
+) -> None:
+    """The key's file, line and column, or the option that gave it."""
+    stuck = LIMIT if "j2" in override else '<limit velocity="1" effort="1"/>'
+    joints = [joint("j1", "base", "l1", more=stuck), joint("j2", "l1", "l2")]
+    urdf = small_robot(link("base"), link("l1"), link("l2"), *joints)
+    moving = ["j1"] if "j2" in override else ["j1", "j2"]
+    loaded = load(tmp_path, urdf, "l2", moving, [override])
+    with pytest.raises(SceneError, match=said):
+        RobotModel.from_cell(loaded)

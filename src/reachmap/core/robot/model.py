@@ -109,9 +109,15 @@ class RobotModel:
         ------
         SceneError
             A frame or joint is unknown, a limit is missing, or the chain from base
-            to TCP cannot be used; one line per mistake.
+            to TCP cannot be used; one line per mistake, with its place in the file.
         """
-        return cls.from_spec(loaded.cell.robot, urdf=loaded.urdf)
+        try:
+            return cls.from_spec(loaded.cell.robot, urdf=loaded.urdf)
+        except SceneError as error:
+            raise SceneError(
+                f"{loaded.place_of(line.partition(':')[0])}: {line}"
+                for line in error.lines
+            ) from error
 
     @classmethod
     def from_spec(cls, spec: RobotSpec, *, urdf: str) -> RobotModel:
