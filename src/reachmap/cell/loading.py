@@ -150,7 +150,8 @@ def _validated(document: Document, overrides: Sequence[str]) -> Cell | None:
     """Apply overrides, write out shorthand, and validate; None where that fails."""
     gather_bins(document)
     restore_expressions(document)
-    apply_overrides(document, overrides, Cell)
+    if overrides:
+        apply_overrides(document, overrides, Cell)
     resolve_expressions(document)
     write_out_mount(document)
     write_out_bins(document)

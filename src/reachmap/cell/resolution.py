@@ -83,12 +83,13 @@ def resolved_cell(
             mesh["file"] = _portable(mesh["file"], files.resolver)
     _write_out_srdf(document, data, files)
     if files.robot is not None:
-        moving = moving_joints(data, files.robot, files.srdf_description)
-        for problem in tighten_limits(
-            robot["limits"], files.joint_limits, files.robot, moving
-        ):
-            document.add(("robot", "joint_limits"), problem)
-        document.raise_mistakes()
+        if files.joint_limits:
+            moving = moving_joints(data, files.robot, files.srdf_description)
+            for problem in tighten_limits(
+                robot["limits"], files.joint_limits, files.robot, moving
+            ):
+                document.add(("robot", "joint_limits"), problem)
+            document.raise_mistakes()
         robot["joint_limits"] = None
         write_out_base_pose(document, data, files.robot)
     try:
