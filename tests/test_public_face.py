@@ -100,5 +100,5 @@ def test_a_single_text_is_one_name_not_its_letters(tmp_path: Path) -> None:
 
 def test_a_placement_and_a_cell_contradict_each_other(tmp_path: Path) -> None:
     """The cell had been scanned, and the placement left unread."""
-    with pytest.raises(SettingsError, match=r"p\.h5 holds the cell"):
+    with pytest.raises(SettingsError, match=r"p\.h5 holds a cell"):
         reachmap.bin_scan(tmp_path / "p.h5", tmp_path / "b.h5", cell="planar-toy")
