@@ -81,7 +81,9 @@ def test_messages_do_not_land_in_the_next_file(tmp_path: Path) -> None:
     assert (tmp_path / "victim").read_bytes() == b""
 
 
-@pytest.mark.parametrize("locale", ["C", "C.UTF-8"])
+@pytest.mark.parametrize(
+    "locale", ["C", pytest.param("C.UTF-8", marks=pytest.mark.slow)]
+)
 def test_a_name_that_is_not_utf_8_is_refused_at_once(
     tmp_path: Path, locale: str
 ) -> None:
@@ -98,6 +100,7 @@ def test_a_name_that_is_not_utf_8_is_refused_at_once(
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_names_that_are_not_utf_8_are_shown_or_refused(tmp_path: Path) -> None:
     """Maps may have them, in pictures, too; a starter cell could not name its robot."""
     done = run(
@@ -146,7 +149,7 @@ def _toy_map(folder: Path) -> Path:
     "env",
     [
         {"MPLBACKEND": "module://matplotlib_inline.backend_inline"},
-        {"HOME": "/nonexistent"},
+        pytest.param({"HOME": "/nonexistent"}, marks=pytest.mark.slow),
         {"HOME": "/proc", "MPLCONFIGDIR": "/proc/none"},
     ],
 )

@@ -106,7 +106,7 @@ def test_a_parameter_that_does_nothing_is_called_null():
     assert null >= ENOUGH
 
 
-@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize("sign", [1, pytest.param(-1, marks=pytest.mark.slow)])
 def test_an_effect_of_two_points_is_found(sign):
     """In at least 95 of 100 seeds the one value that is worth 2 points is named."""
     found = 0
